@@ -3,14 +3,12 @@ from .api.calibration import plan_calibration as plan_calibration
 from .api.calibration import write_built_machine as write_built_machine
 from .api.diagnosis import compare as compare
 from .api.diagnosis import diagnose as diagnose
-from .api.long_recordings import compare_stream as compare_stream
-from .api.long_recordings import fit_stream as fit_stream
-from .api.long_recordings import open_sample as open_sample
 from .api.measurements import plan_measurement as plan_measurement
 from .api.models import add_effect as add_effect
 from .api.models import open_model as open_model
 from .client import connect as connect
 from .comparison.open import open_recording as open_recording
+from .comparison.open import open_sample as open_sample
 from .configuration.shipped import load_machine as load_machine
 from .errors import CompdError as CompdError
 from .model.effects.effect import Constant as Constant

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from datetime import UTC, datetime
-from typing import TypeAlias
 
 import numpy as np
 
-from compd.arrays import FloatArray
 from compd.comparison import (
     AlignedRecording,
     Comparison,
@@ -26,26 +24,17 @@ from compd.model.effects import Effect, FittedEffect, Observations, counted_from
 from compd.model.library import load_library
 from compd.model_file import Declaration, Kind, ModelFile, ModelStep, StoredModel
 
-# What makes of a fit, and the standard deviations (m,) of the noise that it was weighed by, a better one.
-Refinement: TypeAlias = Callable[[FitResult, FloatArray], FitResult]
-
-
-def unrefined(result: FitResult, sigma_um: FloatArray) -> FitResult:
-    """The fit as it is."""
-    return result
-
 
 def add_to_model(
     model: ModelFile,
     declared: Declaration,
     effect: Effect,
     aligned: AlignedRecording,
-    refine: Refinement = unrefined,
     criteria: Criteria = Criteria(),
 ) -> ModelFile:
     """Add an effect and fit all effects together; its nonlinear constants are searched.
 
-    declared : how the file declares the effect.  refine : of a sample, to fit on all rows of its recording.
+    declared : how the file declares the effect.
     Raises StateError where the model has the effect already, CompdError where it cannot be fitted on this recording.
     """
     if effect.id in [fitted.effect.id for fitted in model.fitted]:
@@ -58,7 +47,7 @@ def add_to_model(
     extended = replace(
         model, declared=(*model.declared, declared), plausible={**model.plausible, **_stated(effect, aligned)}
     )
-    return _changed(extended, model, refine(result, before.floor.by_axis_um), before, "add", effect.id, criteria)
+    return _changed(extended, model, result, before, "add", effect.id, criteria)
 
 
 def _stated(effect: Effect, aligned: AlignedRecording) -> dict[str, dict[str, tuple[float, float]]]:
@@ -72,10 +61,9 @@ def remove_effect(
     model: ModelFile,
     effect_id: str,
     aligned: AlignedRecording,
-    refine: Refinement = unrefined,
     criteria: Criteria = Criteria(),
 ) -> ModelFile:
-    """Take an effect out and fit the others again, `refine` as of `add`.
+    """Take an effect out and fit the others again.
 
     Raises StateError where the model has no such effect.
     """
@@ -89,16 +77,15 @@ def remove_effect(
     kept = _as_counted(model.fitted[:k] + model.fitted[k + 1 :], aligned.rows)
     result = fit(aligned, kept, before.floor.by_axis_um)
     reduced = replace(model, declared=model.declared[:k] + model.declared[k + 1 :])
-    return _changed(reduced, model, refine(result, before.floor.by_axis_um), before, "remove", effect_id, criteria)
+    return _changed(reduced, model, result, before, "remove", effect_id, criteria)
 
 
 def refit_model(
     model: ModelFile,
     aligned: AlignedRecording,
-    refine: Refinement = unrefined,
     criteria: Criteria = Criteria(),
 ) -> ModelFile:
-    """Fit all effects again from zero, nonlinear constants as they are, `refine` as of `add`.
+    """Fit all effects again from zero, nonlinear constants as they are.
 
     They then count from machine zero where the recording has the quantities there, else from 20 degC.
     Raises StateError where there are none.
@@ -112,7 +99,7 @@ def refit_model(
         for effect, fitted in zip(effects, model.fitted, strict=True)
     ]
     result = fit(aligned, unfitted, before.floor.by_axis_um)
-    return _changed(model, model, refine(result, before.floor.by_axis_um), before, "fit", "", criteria)
+    return _changed(model, model, result, before, "fit", "", criteria)
 
 
 def undo_step(stored: StoredModel, where: str) -> StoredModel:

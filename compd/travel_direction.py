@@ -3,14 +3,15 @@
 A link reverses when its scale has come back by more than `REVERSAL_MM` from the farthest position that it reached in
 its present direction. Noise below that is no movement, and slow creep counts once it has added up.
 
->>> [travel.direction for travel in follow([0.0, 1.5e-3, 2.3e-3, 1.4e-3, 1.2e-3])]
+>>> directions, last = follow([0.0, 1.5e-3, 2.3e-3, 1.4e-3, 1.2e-3])
+>>> directions
 [0.0, 1.0, 1.0, 1.0, -1.0]
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -49,11 +50,23 @@ def advance(travel: Travel, position_mm: float) -> Travel:
     return Travel(position_mm, direction) if since_mm * direction > 0.0 else travel
 
 
-def follow(positions_mm: Iterable[float], travel: Travel = _UNMOVED) -> Iterator[Travel]:
-    """The state after each of a link's positions, in the order of time. travel : the state before the first."""
+def follow(positions_mm: Iterable[float], travel: Travel = _UNMOVED) -> tuple[list[float], Travel]:
+    """The direction after each of a link's positions, in the order of time, and the last state.
+
+    travel : the state before the first. The rule is that of `advance`, without a state for each of millions of rows.
+    """
+    turning_mm, direction = travel
+    directions = []
     for position_mm in positions_mm:
-        travel = advance(travel, position_mm)
-        yield travel
+        since_mm = position_mm - turning_mm
+        if since_mm > REVERSAL_MM:
+            turning_mm, direction = position_mm, 1.0
+        elif since_mm < -REVERSAL_MM:
+            turning_mm, direction = position_mm, -1.0
+        elif since_mm * direction > 0.0 or math.isnan(turning_mm):
+            turning_mm = position_mm
+        directions.append(direction)
+    return directions, Travel(turning_mm, direction)
 
 
 class RowDirections:
@@ -87,11 +100,8 @@ class RowDirections:
             if not self._travels or session_number != self._session:
                 self._travels, self._session = [_UNMOVED] * links, session_number
             for link in range(links):
-                directions = []
-                for travel in follow(scale_mm[begin:end, link].tolist(), self._travels[link]):
-                    directions.append(travel.direction)
-                direction[begin:end, link] = directions
-                self._travels[link] = travel
+                positions_mm = scale_mm[begin:end, link].tolist()
+                direction[begin:end, link], self._travels[link] = follow(positions_mm, self._travels[link])
         direction[direction == 0.0] = np.nan
         return direction
 

@@ -3,11 +3,6 @@ from .calibration import plan_calibration as plan_calibration
 from .calibration import write_built_machine as write_built_machine
 from .diagnosis import compare as compare
 from .diagnosis import diagnose as diagnose
-from .long_recordings import LongRecording as LongRecording
-from .long_recordings import compare_stream as compare_stream
-from .long_recordings import open_long as open_long
-from .long_recordings import open_sample as open_sample
-from .long_recordings import open_whole_or_sample as open_whole_or_sample
 from .measurements import Range as Range
 from .measurements import plan_measurement as plan_measurement
 from .models import add_effect as add_effect

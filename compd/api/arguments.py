@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TypeAlias
 
-from compd.comparison import AlignedRecording, ComparisonCriteria, open_recording
+from compd.comparison import AlignedRecording, ComparisonCriteria, open_whole_or_sample
 from compd.errors import StateError
 from compd.model.effects import Effect
 from compd.model_file import ModelFile, read_model_file
@@ -22,12 +22,12 @@ Effects: TypeAlias = str | Path | Effect | Sequence[Effect | str | Path]
 
 
 def opened_recording(recording: Recorded, criteria: ComparisonCriteria | None = None) -> AlignedRecording:
-    """A recording, opened with its machine where it is named by its path.
+    """A recording, opened with its machine where it is named by its path: a sample where it is too long for the memory.
 
     criteria : by which it is compared; None for its own. One that is open keeps how it was aligned.
     """
     if not isinstance(recording, AlignedRecording):
-        return open_recording(recording, criteria=criteria or ComparisonCriteria())
+        return open_whole_or_sample(Path(recording), criteria=criteria or ComparisonCriteria())
     return recording if criteria is None else replace(recording, criteria=criteria)
 
 

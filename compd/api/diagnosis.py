@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import TypeVar
 
 from compd.api.arguments import Effects, Model, Recorded, opened_model, opened_recording
 from compd.comparison import Comparison, ComparisonCriteria, counted_by_neighbours
@@ -14,8 +13,6 @@ from compd.diagnosis import diagnose as diagnose_aligned
 from compd.model.effects import can_concern
 from compd.model.library import beside_library, gather_effects
 from compd.parameter_ranges import check_ranges
-
-C = TypeVar("C", bound=Comparison)
 
 
 def compare(recording: Recorded, model: Model = None, *, criteria: ComparisonCriteria | None = None) -> Comparison:
@@ -56,11 +53,8 @@ def compare(recording: Recorded, model: Model = None, *, criteria: ComparisonCri
     """
     aligned = opened_recording(recording, criteria)
     file = opened_model(model, aligned)
-    return with_tested_noise(compare_aligned(aligned, file.fitted, file.covariance))
-
-
-def with_tested_noise(comparison: C) -> C:
-    """The comparison, in units of what neighbouring rows show where they contradict the declared noise."""
+    comparison = compare_aligned(aligned, file.fitted, file.covariance)
+    # in units of what neighbouring rows show where they contradict the declared noise
     left_um = None if comparison.at_floor else comparison.residual_um
     counted = counted_by_neighbours(comparison, left_um)
     return comparison if counted is None else replace(comparison, floor=counted.floor)

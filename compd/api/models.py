@@ -13,7 +13,7 @@ from compd.diagnosis import Criteria
 from compd.errors import CompdError, StateError
 from compd.model.effects import Effect
 from compd.model.library import find_effect, gather_effects, load_library, named_effect
-from compd.model_changes import Refinement, add_to_model, unrefined
+from compd.model_changes import add_to_model
 from compd.model_file import ModelFile, read_model_file, read_stored
 from compd.parameter_ranges import check_ranges
 from compd.recording import EXTERNAL
@@ -65,7 +65,6 @@ def add_effect(
     recording: Recorded,
     *,
     effects: Effects = (),
-    refine: Refinement = unrefined,
     criteria: Criteria = Criteria(),
 ) -> ModelFile:
     """Add an effect to a model: all its effects are fitted together on a recording, and the ledger gets a line.
@@ -82,8 +81,6 @@ def add_effect(
         What to fit on.
     effects : str, Path, Effect, or a sequence of these
         Effects of your own beside those that are installed, as for `diagnose`.
-    refine : callable
-        Makes of the fit a better one: of a sample the fit to all rows, as `fit_stream` has it.
     criteria : Criteria
         As for `diagnose`: of these, `disturbance` widens the standard errors.
 
@@ -115,7 +112,7 @@ def add_effect(
     aligned = opened_recording(recording)
     check_ranges(aligned.ranges, [*gather_effects(effects).values(), resolved])
     on_machine = aligned.on_machine(resolved)
-    return add_to_model(opened_model(model, aligned), declared or resolved.id, on_machine, aligned, refine, criteria)
+    return add_to_model(opened_model(model, aligned), declared or resolved.id, on_machine, aligned, criteria)
 
 
 def _resolve_effect(effect: Effect | str | Path | Mapping[str, Any], known: Mapping[str, Effect]) -> Effect:

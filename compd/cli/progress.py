@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Self, TypeVar
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from compd.clock import Clock
+    from compd.comparison import AlignedRecording
 
 Item = TypeVar("Item")
 # Interval (s) of updates of a number on the terminal.
@@ -26,9 +29,19 @@ def steps_shown(quiet: bool = False) -> Iterator[Callable[[str], None]]:
         yield lambda said: bar.update(task, description=said)
 
 
+def open_shown(
+    path: Path, machine: Path | None, ranges: Sequence[str] = (), hold: Sequence[str] = ()
+) -> AlignedRecording:
+    """The recording, or a sample of one that is too long for the memory, while the rows that are read are counted."""
+    from compd.comparison import open_whole_or_sample
+
+    with count_shown(None, f"reading {path.name}") as progress:
+        return open_whole_or_sample(path, machine, ranges=ranges, hold=hold, progress=progress)
+
+
 @contextmanager
-def count_shown(total: int, what: str) -> Iterator[Callable[[int], None]]:
-    """A function to call with the number done out of `total`; the bar is on standard error until the end."""
+def count_shown(total: int | None, what: str) -> Iterator[Callable[[int], None]]:
+    """A function to call with the number done, out of `total` if known; the bar is on standard error meanwhile."""
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 

@@ -20,6 +20,7 @@ from compd.comparison.noise_floor import NoiseFloor
 from compd.comparison.prediction_uncertainty import Uncertainty
 from compd.comparison.residual_trends import Trend
 from compd.comparison.row_faults import OUTLIER, disagreeing_visits, outlier_faults
+from compd.comparison.sampling_error import drawn_together, rms_standard_error, sample_json, sample_text
 from compd.data_fault import DataFault
 from compd.display_unit import ATTITUDE_UNIT, format_error, residual_ending
 from compd.model import GaugeNoise
@@ -180,8 +181,23 @@ class Comparison:
 
     @property
     def basis(self) -> str:
-        """Which numbers rest on fewer rows than all, in a sentence; "" where all rest on all."""
-        return ""
+        """Of a sample: what it is, and what it leaves uncertain, in sentences; else ""."""
+        sample = self.aligned.recording.sample
+        unit = self.aligned.unit
+        return "" if sample is None else sample_text(sample, self.rms_um, self.rms_sampling_error_um, unit)
+
+    @cached_property
+    def rms_sampling_error_um(self) -> float:
+        """Standard error of `rms_um` by the draw of a sample, 0 of a whole recording."""
+        return self._sampling_error(self.residual_um[:, self.aligned.lengths])
+
+    def _sampling_error(self, residual_um: FloatArray) -> float:
+        """As `rms_sampling_error_um`, of some coordinates (N, k)."""
+        recording, used = self.aligned.recording, self.used
+        if recording.sample is None:
+            return 0.0
+        group = drawn_together(recording.visit, recording.rows)
+        return rms_standard_error(residual_um[used], group[used], recording.sample.rows)
 
     @property
     def rms_um(self) -> float:
@@ -356,6 +372,14 @@ class Comparison:
         }
         if self.aligned.registered:
             report["registration"] = self._registration()
+        if recording.sample is not None:
+            errors = {label: self._sampling_error(self.residual_um[:, [k]]) for k, label in enumerate(report["axes"])}
+            report["sample"] = {
+                **sample_json(recording.sample),
+                "residual_rms_standard_error_um": self.rms_sampling_error_um,
+                "residual_rms_standard_error_xyz_um": errors,
+                "text": self.basis,
+            }
         if self.attitude_residual_urad is not None:
             report["attitude_rms_urad"] = self.attitude_rms_urad
             report["attitude_counts"] = self.aligned.with_attitude

@@ -132,8 +132,8 @@ class ComparisonCriteria:
     can be followed; no effect is computed from them | a choice: beyond it too little of what a residual follows would
     be measured"""
     sample_rows: int = 20_000
-    """rows | so many rows of a recording that is compared block by block fix its noise floor, frame and outliers | they
-    know a standard deviation within 0.5 %, and a comparison of them takes 0.2 GB"""
+    """rows | so many rows of a recording that is too long for the memory are compared | they know a standard deviation
+    within 0.5 %, and a comparison of them takes 0.2 GB"""
     trends_per_coordinate: int = 2
     """trends | so many trends of each coordinate are reported at most | a choice: more are noise in a report"""
     max_collinear: int = 4

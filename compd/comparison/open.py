@@ -11,19 +11,25 @@ Example::
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import TypeAlias
 
-from compd.comparison.alignment.align_recording import align_recording
+from compd.comparison.alignment.align_recording import align_recording, align_sample
 from compd.comparison.alignment.aligned_recording import AlignedRecording
 from compd.comparison.alignment.target_place import held_numbers
 from compd.comparison.criteria import ComparisonCriteria
 from compd.configuration import Configuration, Machine, load_machine, shipped_names
 from compd.errors import Problem, RecordingError
 from compd.parameter_ranges import read_range
-from compd.recording import EXTERNAL, Recording, read_recording, read_sidecar
-from compd.table_file import table_path
+from compd.recording import EXTERNAL, Recording, read_recording, read_sample, read_sidecar
+from compd.table_file import row_count, table_path
+
+# In memory a comparison takes 9 kB a row: more rows than these would take more than 2 GB.
+LONG_ROWS = 200_000
+# Called with the number of finished rows, block after block.
+Progress: TypeAlias = Callable[[int], None]
 
 
 def open_recording(
@@ -81,6 +87,90 @@ def open_recording(
     stated, held = tuple(map(read_range, ranges)), held_numbers(hold)
     recording, configuration = read_with_machine(Path(path), machine)
     return replace(align_recording(recording, configuration, criteria, held), ranges=stated)
+
+
+def is_long(path: Path) -> bool:
+    """Whether a recording has more rows than LONG_ROWS, so that a sample of it is opened.
+
+    False for a file that cannot be read: who reads it whole says everything that is wrong.
+    """
+    try:
+        return row_count(path) > LONG_ROWS
+    except RecordingError:
+        return False
+
+
+def open_whole_or_sample(
+    path: Path,
+    machine: Machine | None = None,
+    *,
+    criteria: ComparisonCriteria = ComparisonCriteria(),
+    ranges: Sequence[str] = (),
+    hold: Sequence[str] = (),
+    progress: Progress = lambda rows: None,
+) -> AlignedRecording:
+    """Open the recording, by `open_sample` where it is too long for the memory; arguments and errors as there."""
+    if not is_long(path):
+        return open_recording(path, machine, criteria=criteria, ranges=ranges, hold=hold)
+    return open_sample(path, machine, criteria=criteria, progress=progress, ranges=ranges, hold=hold)
+
+
+def open_sample(
+    path: str | Path,
+    machine: Machine | None = None,
+    *,
+    rows: int | None = None,
+    criteria: ComparisonCriteria = ComparisonCriteria(),
+    progress: Progress = lambda rows: None,
+    ranges: Sequence[str] = (),
+    hold: Sequence[str] = (),
+) -> AlignedRecording:
+    """Open a sample of a recording of any length, spread evenly; `diagnose`, `compare` and `add_effect` take it.
+
+    The file is read once, block by block. The same file gives the same sample.
+
+    Parameters
+    ----------
+    path : str or Path
+        The recording, NAME.parquet or NAME.csv, in the order of time.
+    machine : str, Path or Configuration, optional
+        As for `open_recording`.
+    rows : int
+        How many rows the sample has, about: rows of one visit stay together. Left out, `sample_rows` of the criteria,
+        20,000.
+    criteria : ComparisonCriteria
+        As for `open_recording`.
+    progress : callable
+        Called with the number of rows that are done, after each block.
+    ranges : sequence of str
+        As for `open_recording`.
+    hold : sequence of str
+        As for `open_recording`.
+
+    Returns
+    -------
+    AlignedRecording
+        Its `recording.sample` says what is known of all rows.
+
+    Raises
+    ------
+    RecordingError, ConfigurationError
+        As `open_recording`; and where `time_s` does not rise from row to row.
+
+    Examples
+    --------
+    >>> import compd
+    >>> compd.open_sample("monday.csv", rows=100).recording.rows
+    95
+    """
+    stated, held, path = tuple(map(read_range, ranges)), held_numbers(hold), Path(path)
+    problems: list[Problem] = []
+    configuration = recorded_machine(table_path(path), machine, problems)
+    if problems:
+        raise RecordingError(problems)
+    most_rows = criteria.sample_rows if rows is None else rows
+    recording = read_sample(path, configuration, most_rows, criteria.max_rows_of_visit, progress)
+    return replace(align_sample(recording, configuration, criteria, held), ranges=stated)
 
 
 def read_with_machine(

@@ -9,8 +9,8 @@ from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
 
-from compd.api import LongRecording, compare, diagnose, open_long
-from compd.comparison import AlignedRecording, Comparison, ComparisonCriteria, compare_blocks, is_long, open_recording
+from compd.api import compare, diagnose
+from compd.comparison import AlignedRecording, Comparison, ComparisonCriteria, open_whole_or_sample
 from compd.configuration import LINKS, Configuration, load
 from compd.diagnosis import Criteria
 from compd.errors import CompdError, Problem
@@ -26,7 +26,7 @@ from compd.fleet.recording_result import (
     RecordingResult,
 )
 from compd.model.kinematics import ACTUATOR_KINDS
-from compd.model_changes import refit_model, unrefined
+from compd.model_changes import refit_model
 from compd.model_file import ModelFile, read_model_file, read_stored
 from compd.recording import EXTERNAL
 from compd.release import __version__
@@ -87,16 +87,11 @@ class Examination:
         """Examine one recording. Raises CompdError if that is impossible."""
         file = self.machines.of(recording)
         configuration = None if file is None else _configuration(file, file_stamp(file))
-        path = recording.path
-        if is_long(path):
-            long = open_long(path, configuration, criteria=self.comparison)
-            aligned = long.sample.aligned
-        else:
-            long, aligned = None, open_recording(path, configuration, criteria=self.comparison)
+        aligned = open_whole_or_sample(recording.path, configuration, criteria=self.comparison)
         model = self._model(recording, aligned)
         if self.command == "diagnose":
             return self._diagnosed(recording, aligned, model)
-        return self._compared(recording, aligned, model, long)
+        return self._compared(recording, aligned, model)
 
     @property
     def _effect_files(self) -> list[Path]:
@@ -119,16 +114,14 @@ class Examination:
         recording: FleetRecording,
         aligned: AlignedRecording,
         model: ModelFile | None,
-        long: LongRecording | None,
     ) -> RecordingResult:
         """The recording compared with the model, and the model's effects fitted on it."""
-        comparison = compare(aligned, model) if long is None else _compared_by_blocks(long, model)
+        comparison = compare(aligned, model)
         verdict = ABOVE_FLOOR if comparison.floor.known else NOISE_NOT_KNOWN
         estimates: list[FleetEstimate] = []
         after_um = math.nan
         if model is not None and model.fitted:
-            refine = unrefined if long is None else long.refine
-            refitted = refit_model(model, aligned, refine, self.criteria)
+            refitted = refit_model(model, aligned, self.criteria)
             after_um = refitted.steps[-1].rms_after_um
             estimates = [
                 FleetEstimate(number.effect, number.parameter, number.value, number.standard_error, number.unit)
@@ -242,11 +235,6 @@ def _configuration(path: Path, stamp: tuple[int, int] | None) -> Configuration:
 def _model(path: Path, stamp: tuple[int, int] | None, machine: str, links: int) -> ModelFile:
     """The model; stamp : of the file, so that it is read again where that has changed."""
     return read_model_file(path, machine, links)
-
-
-def _compared_by_blocks(long: LongRecording, model: ModelFile | None) -> Comparison:
-    effects, covariance = ((), None) if model is None else (model.fitted, model.covariance)
-    return compare_blocks(long.stream, long.sample, effects, covariance)
 
 
 def _kinematics(aligned: AlignedRecording) -> str:

@@ -1,5 +1,4 @@
 from .ball_plate import write_plate as write_plate
-from .blocks import recording_blocks as recording_blocks
 from .checks import limit_of as limit_of
 from .convert import convert_recording as convert_recording
 from .convert import rows_to_convert as rows_to_convert
@@ -13,11 +12,13 @@ from .open_part import OpenPart as OpenPart
 from .open_part import OpenPartFormat as OpenPartFormat
 from .open_part import close_part as close_part
 from .reader import read_recording as read_recording
+from .reader import read_sample as read_sample
 from .recording import BLOCKS as BLOCKS
 from .recording import Recording as Recording
 from .recording import UsableRows as UsableRows
 from .reference import Frame as Frame
 from .reference import sigma_key as sigma_key
+from .sample import RecordingSample as RecordingSample
 from .sidecar import EXTERNAL as EXTERNAL
 from .sidecar import PLACE as PLACE
 from .sidecar import SECTIONS as SECTIONS

@@ -17,7 +17,6 @@ name ends in. What no machine can have made is found by `reference_faults` and `
 from __future__ import annotations
 
 import re
-from collections import Counter
 from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
@@ -122,51 +121,39 @@ def check_values(table: Table, problems: ProblemList) -> None:
     _check_limits(table, problems)
 
 
-class RowCount:
-    """Count of complete rows, block by block."""
+def check_usable_rows(table: Table, excluded: BoolArray, needed: Iterable[str], problems: ProblemList) -> None:
+    """Require two complete rows; else report the reasons for the missing ones.
 
-    def __init__(self) -> None:
-        self.rows = 0
-        self._usable = 0
-        self._left_out: Counter[str] = Counter()
-
-    def add(self, table: Table, excluded: BoolArray, needed: Iterable[str]) -> None:
-        """Count the rows of a block. excluded : (N,) by a person. needed : columns that a row must have.
-
-        A cell that was reported as wrong counts as filled, so that one mistake is reported once.
-        """
-        usable = ~excluded
-        self._left_out["excluded in the sidecar"] += int(excluded.sum())
-        for name in needed:
-            if name in table.wrong:
-                continue
-            empty = usable & np.isnan(table.columns[name])
-            self._left_out[f"without {name}"] += int(empty.sum())
-            usable &= ~empty
-        self.rows += len(table.row)
-        self._usable += int(usable.sum())
-
-    def check(self, problems: ProblemList) -> None:
-        """Require two complete rows; else report the reasons for the missing ones."""
-        if self.rows < 2:
-            problems.add(
-                "",
-                "no rows" if self.rows == 0 else "only one row",
-                allowed="two rows or more",
-                next_step="record more, or give the right file",
-            )
-        elif self._usable < 2:
-            reasons = [f"{count} {reason}" for reason, count in self._left_out.items() if count]
-            problems.add(
-                "",
-                f"{'no' if not self._usable else 'only one'} row of {self.rows} can be used: {', '.join(reasons)}",
-                allowed="two rows or more",
-                next_step="fill these columns, or delete those that were not measured",
-            )
+    excluded : (N,) by a person. needed : columns that a row must have. A cell that was reported as wrong counts as
+    filled, so that one mistake is reported once.
+    """
+    usable = ~excluded
+    left_out = {"excluded in the sidecar": int(excluded.sum())}
+    for name in needed:
+        if name in table.wrong:
+            continue
+        empty = usable & np.isnan(table.columns[name])
+        left_out[f"without {name}"] = int(empty.sum())
+        usable &= ~empty
+    if len(table.row) < 2:
+        problems.add(
+            "",
+            "no rows" if not len(table.row) else "only one row",
+            allowed="two rows or more",
+            next_step="record more, or give the right file",
+        )
+    elif usable.sum() < 2:
+        reasons = [f"{count} {reason}" for reason, count in left_out.items() if count]
+        problems.add(
+            "",
+            f"{'only one' if usable.any() else 'no'} row of {len(table.row)} can be used: {', '.join(reasons)}",
+            allowed="two rows or more",
+            next_step="fill these columns, or delete those that were not measured",
+        )
 
 
 def check_rising_time(table: Table, after_s: float, problems: ProblemList) -> None:
-    """Every row of a block is later than the one before it; the first than `after_s`, the last of the block before."""
+    """Every row of a block is later than the one before it; the first than `after_s`, the end of the block before."""
     with_time = np.flatnonzero(~np.isnan(table.columns["time_s"]))
     rows = np.zeros(len(table.row), dtype=bool)
     rows[with_time] = np.diff(table.columns["time_s"][with_time], prepend=after_s) <= 0
@@ -222,14 +209,10 @@ def _check_limits(table: Table, problems: ProblemList) -> None:
         )
 
 
-def largest_joint_um(table: Table) -> float:
-    """The largest number of a joint comparator; 0 without any."""
+def check_joint_unit(table: Table, problems: ProblemList) -> None:
+    """Warn if the joint comparators never move by their resolution."""
     joints = [values for name, values in table.columns.items() if re.fullmatch(r"joint_\d+_um", name)]
-    return max((float(np.nanmax(np.abs(values))) for values in joints if not np.isnan(values).all()), default=0.0)
-
-
-def check_joint_unit(largest: float, problems: ProblemList) -> None:
-    """Warn if the joint comparators never move by their resolution. largest : of the whole recording, um."""
+    largest = max((float(np.nanmax(np.abs(values))) for values in joints if not np.isnan(values).all()), default=0.0)
     if 0 < largest < _MIN_JOINT_UM:
         problems.warn(
             "columns joint_<k>_um",

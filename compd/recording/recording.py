@@ -23,6 +23,7 @@ from compd.display_unit import MM_PER_RAD
 from compd.errors import Problem
 from compd.recording.ball_plate import BallPlate
 from compd.recording.reference import Reference
+from compd.recording.sample import RecordingSample
 from compd.recording.sidecar import Sidecar
 from compd.recording.visits import file_numbers
 from compd.tables import id_texts
@@ -96,6 +97,7 @@ class Recording:
     warnings : what can be used but should be looked at.
     target_P_mm : (N, 3) or None: where the row's reflector is, from the tip along the axes of {P}; nan where the cell
         is empty; None where the tip itself was measured.
+    sample : where these rows were drawn from a longer recording, what is known of all of it; else None.
     faults : data that are wrong or look so. Cells that these take as empty are so in `quantities`, not in `columns`.
     """
 
@@ -136,6 +138,7 @@ class Recording:
     begin_s: float = 0.0
     faults: tuple[DataFault, ...] = ()
     target_P_mm: FloatArray | None = None
+    sample: RecordingSample | None = None
 
     @property
     def machine(self) -> str:
@@ -178,19 +181,6 @@ class Recording:
             elif column.name in ("quantities", "columns"):
                 chosen[column.name] = {name: values[index] for name, values in value.items()}
         return replace(self, **chosen)
-
-    def extended_by(self, *later: Recording) -> Recording:
-        """These rows followed by those of later parts of the same file with the same columns."""
-        parts = (self, *later)
-        joined: dict[str, Any] = {}
-        for column in fields(self):
-            values = [getattr(part, column.name) for part in parts]
-            if isinstance(values[0], np.ndarray):
-                joined[column.name] = np.concatenate(values)
-            elif column.name in ("quantities", "columns"):
-                joined[column.name] = {name: np.concatenate([each[name] for each in values]) for name in values[0]}
-        faults = tuple(dict.fromkeys(fault for part in parts for fault in part.faults))
-        return replace(self, **joined, faults=faults)
 
     @property
     def gauge_columns(self) -> tuple[str, ...]:

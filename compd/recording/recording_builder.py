@@ -1,9 +1,8 @@
-"""Makes Recordings from a table file's rows, all at once or block by block, with the same checks."""
+"""Makes the Recording of a table file's rows, or of rows drawn from it, with the same checks."""
 
 from __future__ import annotations
 
 import hashlib
-import math
 from collections.abc import Collection, Iterable
 from dataclasses import replace
 from functools import cached_property
@@ -29,12 +28,10 @@ from compd.configuration import Configuration
 from compd.errors import Problem, RecordingError
 from compd.recording.ball_plate import check_balls, read_plate
 from compd.recording.checks import (
-    RowCount,
     check_joint_unit,
-    check_rising_time,
     check_time,
+    check_usable_rows,
     check_values,
-    largest_joint_um,
 )
 from compd.recording.kept_rows import kept_rows
 from compd.recording.layout import Layout, machine_problems, read_layout
@@ -43,10 +40,11 @@ from compd.recording.quaternion import with_rotation_vectors
 from compd.recording.recording import Recording
 from compd.recording.reference_faults import reference_faults
 from compd.recording.reflectors import check_reflectors, reflector_places_mm
+from compd.recording.sample import DrawnRows
 from compd.recording.sidecar import Sidecar, read_sidecar
-from compd.recording.visits import VisitNumbers, pose_mm
+from compd.recording.visits import pose_mm, unique_visits
 from compd.tables import FIRST_ROW, ProblemList, Table, rows_text
-from compd.travel_direction import RowDirections
+from compd.travel_direction import row_directions
 from compd.units import UM_PER_MM
 
 # Decimals (mm) of comparators converted from um: a picometre, far below any gauge, so that a reading written in
@@ -56,24 +54,20 @@ _HASHED_BYTES = 1 << 20
 
 
 class RecordingBuilder:
-    """Makes Recordings of the tables of one file, and keeps the data that a block needs from earlier ones.
+    """Makes the Recording of one file.
 
     Attributes
     ----------
     id_columns : columns of the table that may hold text.
     """
 
-    def __init__(
-        self, path: Path, configuration: Configuration | None, needs_reference: bool, in_blocks: bool = False
-    ) -> None:
+    def __init__(self, path: Path, configuration: Configuration | None, needs_reference: bool) -> None:
         """Read the sidecar; `build` reports its faults.
 
-        path : the table's file.  in_blocks : the rows come in several tables, and their time must rise.
-        configuration, needs_reference : as in `read_recording`.
+        path : the table's file.  configuration, needs_reference : as in `read_recording`.
         """
         self._path = path
         self._configuration = configuration
-        self._in_blocks = in_blocks
         self._problems: list[Problem] = []
         self._sidecar = sidecar = read_sidecar(path.with_suffix(".yaml"), self._problems)
         self._reference_valid = sidecar is not None and (sidecar.reference is not None or not self._problems)
@@ -83,22 +77,14 @@ class RecordingBuilder:
         self.id_columns = ("point", "pin", "reflector", *["ball"] * _names_fixed_ends(sidecar))
         balls = sidecar.reference.balls if sidecar and sidecar.reference else None
         self._plate = None if balls is None else read_plate(balls, self._problems)
-        self._directions = RowDirections()
-        self._visits = VisitNumbers()
-        self._count = RowCount()
-        self._last_row = FIRST_ROW - 1
-        self._last_time_s = -math.inf
-        self._begin_s: float | None = None
-        self._largest_joint_um = 0.0
 
-    def build(self, table: Table | None, table_problems: ProblemList, last: bool = True) -> Recording:
-        """The Recording of the rows that follow those of the last call.
+    def build(self, table: Table | None, table_problems: ProblemList, drawn: DrawnRows | None = None) -> Recording:
+        """The Recording of a table's rows.
 
         table : None if the file has none.  table_problems : what was wrong with it as it was read; what else is
-        wrong is added.  last : no more rows follow.
+        wrong is added.  drawn : of a sample, of which `table` has the rows with those around them.
 
-        Raises RecordingError with every problem of these rows, with the first also those of the sidecar, with the last
-        those of the recording as a whole.
+        Raises RecordingError with every problem of the rows, the sidecar and the recording as a whole.
         """
         sidecar, problems = self._sidecar, self._problems
         if table is None:
@@ -107,15 +93,13 @@ class RecordingBuilder:
         table = with_rotation_vectors(table, table_problems)
         has_time = "time_s" in table.letters or sidecar is None
         if not has_time:
-            table = _with_row_numbers(table, self._count.rows)
+            table = _with_row_numbers(table, drawn)
         layout = read_layout(list(table.letters), sidecar, self._reference_valid, table_problems)
-        if "time_s" in table.columns and self._in_blocks:
-            check_rising_time(table, self._last_time_s, table_problems)
-        elif "time_s" in table.columns:
+        if "time_s" in table.columns:
             check_time(table, table_problems)
         check_values(table, table_problems)
-        excluded = self._excluded(table, table_problems, last)
-        self._check_whole(table, layout, excluded, table_problems, last)
+        excluded = self._excluded(table, table_problems, drawn)
+        self._check_whole(table, layout, excluded, table_problems)
         if self._plate is not None and "ball" in table.columns:
             check_balls(table, self._plate, table_problems)
         if sidecar is not None and sidecar.reference is not None and sidecar.reference.reflectors is not None:
@@ -130,35 +114,23 @@ class RecordingBuilder:
         problems += table_problems.problems
         if problems or sidecar is None:
             raise RecordingError(problems)
-        recording = self._recording(table, sidecar, layout, excluded, tuple(table_problems.warnings))
-        if len(table.row):
-            self._last_row = int(table.row[-1])
-        if recording.rows:
-            self._last_time_s = float(recording.time_s[-1])
+        recording = self._recording(table, sidecar, layout, excluded, tuple(table_problems.warnings), drawn)
         return recording if has_time else _without_time(recording)
 
-    def _check_whole(
-        self, table: Table, layout: Layout, excluded: BoolArray, problems: ProblemList, last: bool
-    ) -> None:
-        """Count for the checks of the whole recording, which are made with the last rows."""
+    def _check_whole(self, table: Table, layout: Layout, excluded: BoolArray, problems: ProblemList) -> None:
+        """The checks that only all rows together allow."""
         needed = _needed_columns(layout, self._sidecar, table.letters)
-        self._largest_joint_um = max(self._largest_joint_um, largest_joint_um(table))
-        if last:
-            check_joint_unit(self._largest_joint_um, problems)
+        check_joint_unit(table, problems)
         if all(name in table.columns for name in needed):
-            self._count.add(table, excluded, needed)
-            if last:
-                self._count.check(problems)
+            check_usable_rows(table, excluded, needed, problems)
 
-    def _excluded(self, table: Table, problems: ProblemList, last: bool) -> BoolArray:
+    def _excluded(self, table: Table, problems: ProblemList, drawn: DrawnRows | None) -> BoolArray:
         """(N,) rows that the person excluded; a row that the file does not have is a problem."""
         sidecar = self._sidecar
         numbers = np.array(sorted(sidecar.excluded), dtype=np.int64) if sidecar else np.array([], dtype=np.int64)
-        absent = numbers[(numbers > self._last_row) & ~np.isin(numbers, table.row)]
-        if not last:  # rows beyond may be in later blocks
-            absent = absent[absent <= table.row[-1]] if len(table.row) else absent[:0]
+        last_row = drawn.last_row if drawn else max([FIRST_ROW - 1, *table.row[-1:].tolist()])
+        absent = numbers[numbers > last_row if drawn else ~np.isin(numbers, table.row) & (numbers >= FIRST_ROW)]
         if len(absent) and sidecar is not None:
-            last_row = max([self._last_row, *table.row[-1:].tolist()])
             problems.problems.append(
                 Problem(
                     f"{sidecar.path} excluded_rows",
@@ -170,14 +142,18 @@ class RecordingBuilder:
         return np.isin(table.row, numbers)
 
     def _recording(
-        self, table: Table, sidecar: Sidecar, layout: Layout, excluded: BoolArray, warnings: tuple[Problem, ...]
+        self,
+        table: Table,
+        sidecar: Sidecar,
+        layout: Layout,
+        excluded: BoolArray,
+        warnings: tuple[Problem, ...],
+        drawn: DrawnRows | None,
     ) -> Recording:
         """The rows in the order of time; those that are left out are counted."""
         kept, left_out = kept_rows(table.columns)
         columns = {name: values[kept] for name, values in table.columns.items()}
-        if self._begin_s is None and len(kept):
-            self._begin_s = float(columns["time_s"][0])
-        left_out["empty row"] = self._blank_rows(table)
+        left_out["empty row"] = 0 if drawn else _blank_rows(table)
 
         def stack(names: Iterable[str]) -> FloatArray | None:
             present = [columns[name] for name in names if name in columns]
@@ -197,7 +173,8 @@ class RecordingBuilder:
         scale_mm = stack(scale_columns(layout.scales))
         approach = stack(approach_columns(layout.scales)) if layout.approach else None
         if approach is None and scale_mm is not None:
-            approach = self._directions.of_block(scale_mm, session)
+            known = None if drawn is None else drawn.approach
+            approach = row_directions(scale_mm, session) if known is None else known[kept]
         joint_um = stack(joint_columns(layout.joints))
         frame_um = stack(frame_columns(layout.frame))
         position = in_mm("reference", AXES)
@@ -217,12 +194,13 @@ class RecordingBuilder:
         )
         place_mm = next((place for place in poses_mm if place is not None), None)
         visit = ids("visit")
-        visit = None if visit is None else self._visits.of_block(visit, session, place_mm, places_mm)
-        if visit is not None and self._visits.again and not self._in_blocks:
-            warnings = (*warnings, self._visits_again())
+        if visit is not None:
+            visit, again = unique_visits(visit, session, place_mm, places_mm)
+            warnings = (*warnings, self._visits_again(again)) if again and not drawn else warnings
         covariates, row = {name: columns[name] for name in layout.covariates}, table.row[kept]
         same_frame = sidecar.reference is not None and sidecar.reference.frame == "machine"
-        counting = ~excluded[kept]
+        sample = None if drawn is None else drawn.sample
+        counting = ~excluded[kept] & (sample is None or np.isin(row, sample.row))
         counted = {name: values[counting] for name, values in columns.items()}
         of_reference = reference_faults(counted, row[counting], same_frame)
         hanging = hanging_reference(counted, row[counting], of_reference)
@@ -268,23 +246,20 @@ class RecordingBuilder:
             left_out={reason: count for reason, count in left_out.items() if count},
             columns=columns,
             warnings=warnings,
-            begin_s=self._begin_s or 0.0,
+            begin_s=float(columns["time_s"][0]) if len(kept) else 0.0,
             faults=tuple(faults),
             target_P_mm=places_mm,
+            sample=sample,
         )
 
-    def _visits_again(self) -> Problem:
+    def _visits_again(self, again: int) -> Problem:
         return Problem(
             f"{self._path} column `visit`",
             "numbers come back for rows in another session, at another place or after other visits",
-            value=f"{self._visits.again} numbers",
+            value=f"{again} numbers",
             allowed="a visit has rows that follow each other in one session at one place; a return is another",
             next_step="number the visits on from session to session, if all is to be unique",
         )
-
-    def _blank_rows(self, table: Table) -> int:
-        """Empty rows between those of the table, and between the last block and it."""
-        return int(table.row[-1]) - self._last_row - len(table.row) if len(table.row) else 0
 
     @cached_property
     def _sha256(self) -> str:
@@ -310,10 +285,16 @@ def _no_reference(sidecar: Sidecar) -> Problem:
     )
 
 
-def _with_row_numbers(table: Table, first: int) -> Table:
-    """The table with the number of each row, from `first`, in the place of its time: rows count as taken in order."""
-    numbers = np.arange(first, first + len(table.row), dtype=np.float64)
-    return replace(table, letters={**table.letters, "time_s": ""}, columns={**table.columns, "time_s": numbers})
+def _blank_rows(table: Table) -> int:
+    """Empty rows between those of the table, and before the first."""
+    return int(table.row[-1]) - FIRST_ROW + 1 - len(table.row) if len(table.row) else 0
+
+
+def _with_row_numbers(table: Table, drawn: DrawnRows | None) -> Table:
+    """The table with the number of each row, from 0, in the place of its time: rows count as taken in order."""
+    numbers = np.arange(len(table.row)) if drawn is None else table.row - FIRST_ROW
+    columns = {**table.columns, "time_s": numbers.astype(np.float64)}
+    return replace(table, letters={**table.letters, "time_s": ""}, columns=columns)
 
 
 def _without_time(recording: Recording) -> Recording:

@@ -5,11 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-import numpy as np
-from plotly.graph_objects import Figure, Scatter
-from plotly.subplots import make_subplots
+from plotly.graph_objects import Figure
 
-from compd.comparison import Comparison, StreamedComparison, covariates
+from compd.comparison import Comparison, covariates
 from compd.model_file import parameter_estimates
 from compd.report.comparison_table import name_of, no_trend_text, summary
 from compd.report.figures import (
@@ -19,37 +17,11 @@ from compd.report.figures import (
     plot_residual_vectors,
     plot_workspace_map,
 )
-from compd.report.page import INK, Panel, style_figure, write_page
+from compd.report.page import Panel, write_page
 from compd.report.page_table import PageTable
-from compd.report.small_multiples import SERIES_COLOURS, plot_residual_against
-from compd.units import UNIT_KINDS
+from compd.report.small_multiples import plot_residual_against
 
-ROW_PX = 210
-SECONDS_PER_HOUR = UNIT_KINDS[1]["h"]
-
-
-def plot_envelope(comparison: StreamedComparison) -> Figure:
-    """All used rows, one coordinate below the other."""
-    aligned, envelope = comparison.aligned, comparison.totals.envelope
-    figure = make_subplots(len(aligned.labels), 1, shared_xaxes=True, vertical_spacing=0.06)
-    style_figure(figure, "", "", 110 + ROW_PX * len(aligned.labels)).update_layout(showlegend=False)
-    has_time = aligned.recording.has_time
-    x = (envelope.middle_s / SECONDS_PER_HOUR if has_time else envelope.middle_s).astype(np.float32)
-    for k, label in enumerate(aligned.labels):
-        colour = SERIES_COLOURS[k % len(SERIES_COLOURS)]
-        # the largest first, and the smallest filled up to it
-        for values, line, fill in (
-            (envelope.largest, {"width": 0.5, "color": colour}, None),
-            (envelope.smallest, {"width": 0.5, "color": colour}, "tonexty"),
-            (envelope.mean, {"width": 1.5, "color": INK}, None),
-        ):
-            trace = Scatter(x=x, y=values[:, k].astype(np.float32), mode="lines", line=line, fill=fill)
-            figure.add_trace(trace, row=k + 1, col=1)
-        figure.update_yaxes(title_text=f"residual in {label}, {aligned.unit_of(label)}", row=k + 1, col=1)
-    return figure.update_xaxes(title_text="time, h" if has_time else "row", row=len(aligned.labels), col=1)
-
-
-HOW_TO_READ = "Dots are rows (at most 500 are drawn), lines are means over all {rows}; a flat line at zero is right."
+HOW_TO_READ = "Dots are rows (at most 500 are drawn), lines are means over all rows; a flat line at zero is right."
 
 
 def write_comparison_page(path: Path, comparisons: Sequence[Comparison], shared_script: bool = False) -> None:
@@ -61,7 +33,7 @@ def write_comparison_page(path: Path, comparisons: Sequence[Comparison], shared_
         for comparison in comparisons
     )
     bases = dict.fromkeys(comparison.basis for comparison in comparisons if comparison.basis)
-    caption = " ".join(["A rms is per coordinate: root of the mean over rows and axes.", *map(_sentence, bases)])
+    caption = " ".join(["A rms is per coordinate: root of the mean over rows and axes.", *bases])
     panels = [Panel("In numbers", caption, summary(comparisons))]
     if comparisons[0].fitted:
         numbers = _effects(comparisons[0])
@@ -93,10 +65,8 @@ def _panels(comparison: Comparison, prefix: str) -> list[Panel]:
     placed = {name for names in groups.values() for name in names}
     groups["everything else measured"] = [name for name in by_name if name not in placed]
     vectors, enlarged = plot_residual_vectors(comparison)
-    rows, of_sample = "rows", ""
-    if isinstance(comparison, StreamedComparison):
-        rows, of_sample = f"{comparison.sample_rows} rows of the sample", " Of the sample."
-    how_to_read = HOW_TO_READ.format(rows=rows)
+    of_sample = " Of the sample." if comparison.basis else ""
+    how_to_read = HOW_TO_READ + of_sample
     sentences = [trend.text for trend in comparison.trends] or [no_trend_text(comparison)]
     panels = [
         Panel(
@@ -122,7 +92,6 @@ def _panels(comparison: Comparison, prefix: str) -> list[Panel]:
             )
             for group, names in groups.items()
         ),
-        *_over_time(comparison),
         Panel(
             "Residual pulled back to the links",
             "The errors of link lengths that would explain the residual at "
@@ -147,14 +116,6 @@ def _panels(comparison: Comparison, prefix: str) -> list[Panel]:
         ),
     ]
     return [Panel(prefix + panel.title, panel.caption, panel.content) for panel in panels]
-
-
-def _over_time(comparison: Comparison) -> list[Panel]:
-    """All rows of a long recording over time; shorter ones are in the residual against time."""
-    if not isinstance(comparison, StreamedComparison):
-        return []
-    caption = f"Of all {comparison.rows_used} rows: the smallest, the mean and the largest value of each short time."
-    return [Panel("Residual over time", caption, plot_envelope(comparison))]
 
 
 def _verdict(comparison: Comparison) -> str:

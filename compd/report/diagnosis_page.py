@@ -90,12 +90,9 @@ def _add_rows(figure: Figure, k: int, x: FloatArray, values: FloatArray, rows: I
 
 
 def write_diagnosis_page(
-    path: Path, diagnosis: Diagnosis, holdouts: Sequence[Holdout], shared_script: bool = False, recorded_rows: int = 0
+    path: Path, diagnosis: Diagnosis, holdouts: Sequence[Holdout], shared_script: bool = False
 ) -> None:
-    """Write the page; it works offline.
-
-    shared_script : as in `write_page`.  recorded_rows : of the file, where a sample of it was diagnosed.
-    """
+    """Write the page; it works offline. shared_script : as in `write_page`."""
     recording = diagnosis.before.aligned.recording
     fall = error_fall(diagnosis)
     panels = [
@@ -106,10 +103,9 @@ def write_diagnosis_page(
         *_description_panels(diagnosis, fall),
         *_table_panels(diagnosis, fall),
     ]
-    sample = f"a sample of {recording.rows} rows of {recorded_rows}, spread evenly; " if recorded_rows else ""
     footer = (
-        f"{recording.path}, sha256 {recording.sha256[:16]}; {sample}{int(diagnosis.after.used.sum())} rows used; "
-        f"noise floor: {diagnosis.before.floor.how}."
+        f"{recording.path}, sha256 {recording.sha256[:16]}; {int(diagnosis.after.used.sum())} rows used; "
+        f"noise floor: {diagnosis.before.floor.how}. {diagnosis.before.basis}".rstrip()
     )
     title = f"Diagnosis of {recording.machine}: {diagnosis.verdict}"
     write_page(path, title, PageText("\n".join(summary_lines(diagnosis))), panels, footer, shared_script)

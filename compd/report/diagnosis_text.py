@@ -53,6 +53,8 @@ def print_diagnosis(console: Console, diagnosis: Diagnosis, holdouts: Sequence[H
         _paragraph(console, text)
     _print_candidates(console, diagnosis, fall)
     _print_next(console, diagnosis)
+    if basis := diagnosis.before.basis:
+        _paragraph(console, basis)
 
 
 def _print_findings(console: Console, diagnosis: Diagnosis, fall: ErrorFall) -> None:

@@ -100,7 +100,7 @@ class ParquetTable:
 
     def _batches(self, rows: int, names: Sequence[str] | None = None) -> Iterator[Any]:
         try:
-            yield from self._file.iter_batches(rows, columns=names or self._names, use_threads=False)
+            yield from self._file.iter_batches(rows, columns=names or self._names)
         except MemoryError as error:
             raise RecordingError(_too_large(self._path)) from error
         except self._faults as error:
@@ -162,16 +162,9 @@ class ParquetTable:
                     "a number, or null where nothing was measured",
                     "write null",
                 )
-                values[infinite] = np.nan
-        row = row[filled]
-        return Table(
-            self._path,
-            dict.fromkeys(self._names, ""),
-            {name: values[filled] for name, values in columns.items()},
-            row,
-            dict(labels),
-            frozenset(wrong),
-        )
+                columns[name] = np.where(infinite, np.nan, values)
+        table = Table(self._path, dict.fromkeys(self._names, ""), columns, row, dict(labels), frozenset(wrong))
+        return table if filled.all() else table.select(np.flatnonzero(filled))
 
     def _values(self, column: Any, labels: Sequence[str] | None) -> FloatArray:
         """(N,) numbers, nan for null; of texts the index among `labels`, where they are more than numbers."""
@@ -182,8 +175,7 @@ class ParquetTable:
             numbers = plain_numbers(cells)
             assert numbers is not None
             return numbers
-        # a copy: Arrow's data is read-only
-        return np.array(column.cast("float64", safe=False).to_numpy(zero_copy_only=False), dtype=np.float64)
+        return np.asarray(column.cast("float64", safe=False).to_numpy(zero_copy_only=False), dtype=np.float64)
 
 
 def _cells(column: Any) -> list[str]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import NamedTuple
 
@@ -48,6 +48,18 @@ class Table:
         if name in self.labels:
             return list(id_texts(self.columns[name], self.labels[name]))
         return ["" if np.isnan(value) else f"{value:.15g}" for value in self.columns[name]]
+
+    def select(self, index: IntArray) -> Table:
+        """The rows of this index (R,), copied."""
+        return replace(
+            self, columns={name: values[index] for name, values in self.columns.items()}, row=self.row[index]
+        )
+
+    def extended_by(self, *later: Table) -> Table:
+        """These rows followed by those of later blocks of the same file."""
+        parts = (self, *later)
+        columns = {name: np.concatenate([part.columns[name] for part in parts]) for name in self.columns}
+        return replace(self, columns=columns, row=np.concatenate([part.row for part in parts]))
 
 
 class TableBlock(NamedTuple):

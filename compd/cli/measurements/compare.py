@@ -38,9 +38,11 @@ def compare(
 ) -> None:
     """Compare the model with recordings: print residuals, noise floor, contributions and the worst regions.
 
-    A recording of more than 200,000 rows is processed block by block, in constant memory; results from a sample of it
-    are marked.
+    Of a recording of more than 200,000 rows a sample is compared, spread evenly; the result says what that leaves
+    uncertain.
     """
+    from compd.api import compare as compare_recording
+    from compd.cli.progress import open_shown
     from compd.errors import CompdError, Problem
 
     if html is not None:
@@ -51,7 +53,7 @@ def compare(
     comparisons: list[Comparison] = []
     for path in recordings:
         try:
-            comparisons.append(_compare(path, machine, model, hold))
+            comparisons.append(compare_recording(open_shown(path, machine, hold=hold or ()), model))
         except CompdError as error:
             problems += error.problems
     if problems:
@@ -67,24 +69,6 @@ def compare(
     print_comparisons(comparisons)
     if html is not None:
         typer.echo(f"The same as pictures: {html}")
-
-
-def _compare(path: Path, machine: Path | None, model: Path | None, hold: list[str] | None) -> Comparison:
-    """The comparison in memory, or block by block for a long recording."""
-    from compd.comparison import is_long
-
-    if not is_long(path):
-        from compd.api import compare as compare_recording
-        from compd.comparison import open_recording
-
-        return compare_recording(open_recording(path, machine, hold=hold or ()), model)
-    from compd.api import compare_stream
-    from compd.cli.progress import count_shown
-    from compd.table_file import row_count
-
-    # two passes: for the sample, then row by row
-    with count_shown(2 * row_count(path), f"comparing {path.name}") as progress:
-        return compare_stream(path, model, machine=machine, progress=progress, hold=hold or ())
 
 
 def print_comparisons(comparisons: list[Comparison]) -> None:
@@ -124,7 +108,7 @@ def print_comparisons(comparisons: list[Comparison]) -> None:
         if sidecar.quantities_at_zero is None and not sidecar.external and any(map(_is_measured, comparison.fitted)):
             console.print(f"Effects count from {sidecar.counts_from}.")
         if comparison.basis:
-            console.print(f"{comparison.basis}.")
+            console.print(comparison.basis)
 
 
 def _is_measured(fitted: FittedEffect) -> bool:

@@ -3,16 +3,12 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 
 from compd.cli.options import EffectsOption, HoldOption, MachineOption, OverwriteOption, RangesOption
-
-if TYPE_CHECKING:
-    from compd.comparison import AlignedRecording
 
 
 def diagnose(
@@ -42,7 +38,7 @@ def diagnose(
     from rich.console import Console
 
     from compd.api import diagnose as diagnose_recording
-    from compd.cli.progress import steps_shown
+    from compd.cli.progress import open_shown, steps_shown
     from compd.diagnosis import evaluate_holdouts
     from compd.report import print_diagnosis
 
@@ -50,38 +46,21 @@ def diagnose(
         from compd.report import check_page_path
 
         check_page_path(html, overwrite)
-    sealed = [_open(path, machine, (), hold or ())[0] for path in recordings[1:]]
-    aligned, all_rows = _open(recordings[0], machine, ranges or (), hold or ())
+    sealed = [open_shown(path, machine, hold=hold or ()) for path in recordings[1:]]
+    aligned = open_shown(recordings[0], machine, ranges or (), hold or ())
     with steps_shown(quiet=as_json) as progress:
         diagnosis = diagnose_recording(aligned, model, effects=effects or (), progress=progress)
     diagnosis, holdouts = evaluate_holdouts(diagnosis, sealed)
     if html is not None:
         from compd.report import write_diagnosis_page
 
-        write_diagnosis_page(html, diagnosis, holdouts, recorded_rows=all_rows)
+        write_diagnosis_page(html, diagnosis, holdouts)
     if as_json:
         data: dict[str, Any] = {**diagnosis.as_json(), "sealed": [holdout.as_json() for holdout in holdouts]}
-        if all_rows:
-            data["sample"] = {"rows": aligned.recording.rows, "of": all_rows}
+        if "sample" in (compared := diagnosis.before.as_json()):
+            data["sample"] = compared["sample"]
         typer.echo(json.dumps(data, indent=1, allow_nan=False))
         return
     print_diagnosis(Console(highlight=False), diagnosis, holdouts)
-    if all_rows:
-        typer.echo(f"From a sample of {aligned.recording.rows} rows of {all_rows}, spread evenly.")
     if html is not None:
         typer.echo(f"The same as pictures: {html}")
-
-
-def _open(path: Path, machine: Path | None, ranges: Sequence[str], hold: Sequence[str]) -> tuple[AlignedRecording, int]:
-    """The recording and 0; for one too long for the memory a sample, and the number of its rows."""
-    from compd.comparison import is_long, open_recording
-
-    if not is_long(path):
-        return open_recording(path, machine, ranges=ranges, hold=hold), 0
-    from compd.api import open_sample
-    from compd.cli.progress import count_shown
-    from compd.table_file import row_count
-
-    rows = row_count(path)
-    with count_shown(rows, f"drawing a sample of {path.name}") as progress:
-        return open_sample(path, machine, progress=progress, ranges=ranges, hold=hold), rows

@@ -14,12 +14,10 @@ from compd.cli.paths import PathKind
 if TYPE_CHECKING:
     from rich.console import RenderableType
 
-    from compd.arrays import FloatArray
-    from compd.comparison import AlignedRecording, FitResult
+    from compd.comparison import AlignedRecording
     from compd.configuration import Configuration
     from compd.errors import Problem
     from compd.model.effects import Effect
-    from compd.model_changes import Refinement
     from compd.model_file import Declaration, ModelFile
 
 ModelOption = Annotated[Path, typer.Option("--model", help="The model file; `add` creates a missing one.")]
@@ -94,9 +92,9 @@ def add(
     """Add an effect to a model and fit all its effects together."""
     from compd.api import add_effect
 
-    aligned, refine = _open(recording, machine, ranges or (), hold or ())
+    aligned = _open(recording, machine, ranges, hold)
     before = _read_model(model, aligned) if model.exists() else None
-    changed = add_effect(before, name, aligned, effects=effects or (), refine=refine)
+    changed = add_effect(before, name, aligned, effects=effects or ())
     _finish(model, before, changed, aligned, f"added {changed.steps[-1].effect}", dry_run)
 
 
@@ -112,9 +110,9 @@ def remove(
     """Take an effect out of a model and fit the others again."""
     from compd.model_changes import remove_effect
 
-    aligned, refine = _open(recording, machine, hold=hold or ())
+    aligned = _open(recording, machine, hold=hold)
     before = _read_model(model, aligned)
-    _finish(model, before, remove_effect(before, name, aligned, refine), aligned, f"removed {name}", dry_run)
+    _finish(model, before, remove_effect(before, name, aligned), aligned, f"removed {name}", dry_run)
 
 
 @effect.command()
@@ -128,9 +126,9 @@ def fit(
     """Fit all effects of a model again, on another recording."""
     from compd.model_changes import refit_model
 
-    aligned, refine = _open(recording, machine, hold=hold or ())
+    aligned = _open(recording, machine, hold=hold)
     before = _read_model(model, aligned)
-    _finish(model, before, refit_model(before, aligned, refine), aligned, "fitted again", dry_run)
+    _finish(model, before, refit_model(before, aligned), aligned, "fitted again", dry_run)
 
 
 @effect.command()
@@ -150,29 +148,15 @@ def _declared_id(declared: Declaration) -> str:
 
 
 def _open(
-    path: Path, machine: Path | None, ranges: Sequence[str] = (), hold: Sequence[str] = ()
-) -> tuple[AlignedRecording, Refinement]:
-    """The recording; for one too long for the memory a sample, and the function that fits to all its rows."""
-    from compd.comparison import is_long, open_recording
-    from compd.model_changes import unrefined
+    path: Path, machine: Path | None, ranges: Sequence[str] | None = None, hold: Sequence[str] | None = None
+) -> AlignedRecording:
+    """The recording; for one too long for the memory a sample, which is said."""
+    from compd.cli.progress import open_shown
 
-    if not is_long(path):
-        return open_recording(path, machine, ranges=ranges, hold=hold), unrefined
-    from compd.api import open_long
-    from compd.cli.progress import count_shown
-    from compd.table_file import row_count
-
-    rows = row_count(path)
-    with count_shown(rows, f"drawing a sample of {path.name}") as progress:
-        long = open_long(path, machine, progress, ranges=ranges, hold=hold)
-    aligned = long.sample.aligned
-
-    def refine(result: FitResult, sigma_um: FloatArray) -> FitResult:
-        with count_shown(rows, f"fitting to {path.name}, one of 2 to 5 passes") as progress:
-            return long.refine(result, sigma_um, progress)
-
-    typer.echo(f"Fitted to {rows} rows; errors are of a sample of {aligned.recording.rows}, spread evenly.")
-    return aligned, refine
+    aligned = open_shown(path, machine, ranges or (), hold or ())
+    if sample := aligned.recording.sample:
+        typer.echo(f"Fitted to {len(sample.row):,} of {sample.rows:,} rows: a sample. Standard errors are those of it.")
+    return aligned
 
 
 def _read_model(path: Path, aligned: AlignedRecording) -> ModelFile:

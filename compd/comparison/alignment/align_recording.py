@@ -44,6 +44,29 @@ def align_recording(
     )
 
 
+def align_sample(
+    recording: Recording,
+    configuration: Configuration | None,
+    criteria: ComparisonCriteria = ComparisonCriteria(),
+    held: frozenset[str] = frozenset(),
+) -> AlignedRecording:
+    """As `align_recording`, of the rows that were drawn; each is observed between its neighbours.
+
+    recording : of `read_sample`.
+    """
+    sample = recording.sample
+    assert sample is not None
+    model = None if configuration is None else build_model(configuration.geometry, configuration.wiring)
+    geometry_hash = "" if configuration is None else configuration.geometry_hash
+    drawn = np.flatnonzero(np.isin(recording.row, sample.row))
+    rows = recorded_observations(recording, model, criteria).select(drawn)
+    recording = recording.select(drawn)
+    if len(sample.row) == sample.rows:
+        recording = replace(recording, sample=None)
+    rows = replace(rows, session_start=session_starts(recording))
+    return align_observations(recording, model, rows, geometry_hash, criteria, held=held)
+
+
 def recorded_observations(
     recording: Recording, model: MachineModel | None, criteria: ComparisonCriteria = ComparisonCriteria()
 ) -> Observations:
@@ -66,12 +89,10 @@ def align_observations(
     observations: Observations,
     geometry_hash: str = "",
     criteria: ComparisonCriteria = ComparisonCriteria(),
-    part_of: AlignedRecording | None = None,
     held: frozenset[str] = frozenset(),
 ) -> AlignedRecording:
     """As `align_recording`, for rows that are observed already.
 
-    part_of : of a block of a long recording the sample of it that places the instrument's frame, or the fixed ends.
     held : numbers of the registration that are not fitted along; see `HELD`. Raises CompdError for one that this
         recording does not fit in any case.
     """
@@ -83,7 +104,7 @@ def align_observations(
             allowed="machines of which the platform carries the tool",
             next_step="make a recording of each reflector by itself",
         )
-    if held and part_of is None:
+    if held:
         _check_held(recording, model, held)
     if recording.reference_link_mm is not None:
         labels = tuple(f"link {i}" for i in recording.reference_links)
@@ -110,7 +131,6 @@ def align_observations(
                 np.full((recording.rows, 3), np.nan),
                 None,
                 geometry_hash,
-                part_of=part_of,
                 criteria=criteria,
             ),
             end,
@@ -119,18 +139,16 @@ def align_observations(
     if measured_mm is None:
         raise RecordingError.of(str(recording.path), "has no column of the reference")
     axes = tuple("xyz".index(axis) for axis in recording.reference_axes)
-    registration = None if part_of is None else part_of.registration
-    target = None if part_of is None else part_of.target
+    registration: Registration | None = None
+    target: PlacedTarget | None = None
     rotation_rad, nominal = recording.reference_rotation_rad, observations.rotation_M_P
-    if part_of is None and recording.reference.frame == "instrument" and rotation_rad is not None and model is not None:
+    if recording.reference.frame == "instrument" and rotation_rad is not None and model is not None:
         target = _placed(recording, rotation_rad, observations, axes, criteria, held)
     if target is not None and rotation_rad is not None:
         registration = target.registration
-        turn = target_turn(rotation_rad, nominal, registration) if part_of is None else part_of.target_turn
+        turn = target_turn(rotation_rad, nominal, registration)
         measured_mm = target.tip_M_mm(measured_mm, measured_attitude(rotation_rad, registration, turn))
-    elif registration is not None:
-        measured_mm = registration.into_M(_in_space(measured_mm, axes))[:, list(axes)]
-    elif recording.reference.frame == "instrument" and part_of is None:
+    elif recording.reference.frame == "instrument":
         seen_M_mm = target_M_mm(observations.tip_M_mm, nominal, recording.target_P_mm)
         registration, measured_mm = _registered(recording, measured_mm, seen_M_mm, axes, criteria)
     labels = recording.reference_axes
@@ -141,7 +159,7 @@ def align_observations(
     declared = np.isfinite(reference.standard_uncertainty).any()
     weighed &= bool(np.isfinite(reference.sigma_urad)) or not declared
     if weighed and rotation_rad is not None:
-        turn = target_turn(rotation_rad, nominal, registration) if part_of is None else part_of.target_turn
+        turn = target_turn(rotation_rad, nominal, registration)
         attitude = measured_attitude(rotation_rad, registration, turn)
         measured_mm = np.concatenate([measured_mm, attitude_mm(attitude, nominal)], axis=1)
         labels = (*labels, *ATTITUDE_LABELS)
@@ -154,10 +172,9 @@ def align_observations(
         measured_mm,
         registration,
         geometry_hash,
-        part_of=part_of,
         criteria=criteria,
         target=target,
-        held=held if part_of is None else part_of.held,
+        held=held,
     )
 
 
@@ -198,18 +215,12 @@ def _check_held(recording: Recording, model: MachineModel | None, held: frozense
 
 
 def _at_fixed_ends(aligned: AlignedRecording, end: IntArray) -> AlignedRecording:
-    """The recording with the fixed balls or pins found, and what was measured from them. end : (N,).
-
-    Of a block of a long recording they are where its sample has found them.
-    """
+    """The recording with the fixed balls or pins found, and what was measured from them. end : (N,)."""
     recording, where = aligned.recording, str(aligned.recording.path)
     assert recording.reference is not None
     distance_mm = recording.reference_distance_mm
     tip_mm = np.where(recording.unused[:, None], np.nan, aligned.nominal_tip_mm)
-    if aligned.part_of is not None:
-        assert aligned.part_of.ends is not None
-        ends = aligned.part_of.ends.at_rows(end, recording.end_name, where)
-    elif distance_mm is None:
+    if distance_mm is None:
         ends = place_pins(tip_mm, end, recording.end_name, where)
     else:
         ends = place_balls(

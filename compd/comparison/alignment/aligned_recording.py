@@ -83,9 +83,6 @@ class AlignedRecording:
         Of distances and pins the fixed balls or pins, whose places are always fitted along; None for others.
     geometry_hash : str
         Of the configuration that the model was built from; ``""`` for ``machine: external``.
-    part_of : AlignedRecording or None
-        Of a block of a long recording the sample of it that places the instrument's frame, or fixed balls and pins;
-        None for a whole recording.
     criteria : ComparisonCriteria
         The numbers by which it was aligned, and by which it is compared and fitted.
     target : PlacedTarget or None
@@ -105,7 +102,6 @@ class AlignedRecording:
     registration: Registration | None
     geometry_hash: str = ""
     ends: FixedEnds | None = None
-    part_of: AlignedRecording | None = None
     criteria: ComparisonCriteria = ComparisonCriteria()
     target: PlacedTarget | None = None
     held: frozenset[str] = frozenset()
@@ -259,10 +255,9 @@ class AlignedRecording:
             return self.ends.columns(self.nominal_tip_mm)
         if self.registered:
             seen_M_mm = self._seen_M_mm
-            points_M_mm = seen_M_mm if self.part_of is None else self.part_of._seen_M_mm
-            columns = registration_columns(seen_M_mm, self.axes, points_M_mm)
+            columns = registration_columns(seen_M_mm, self.axes, seen_M_mm)
             place = self._place_columns
-            spread_mm = points_spread_mm(points_M_mm)
+            spread_mm = points_spread_mm(seen_M_mm)
             if self.with_attitude:
                 columns = attitude_registration_columns(columns, place, self.rows.rotation_M_P, spread_mm)
             else:
@@ -404,8 +399,6 @@ class AlignedRecording:
     @cached_property
     def target_turn(self) -> FloatArray | None:
         """(3, 3) how the instrument's target is turned on the platform; None where nothing is to be found of it."""
-        if self.part_of is not None:
-            return self.part_of.target_turn
         measured = self.recording.reference_rotation_rad
         if measured is None or self.held >= HELD["target.attitude"]:
             return None

@@ -62,22 +62,6 @@ class FixedEnds:
         """The rows of this index (R,)."""
         return replace(self, of_row=self.of_row[index])
 
-    def at_rows(self, end: IntArray, name: Callable[[int], str], where: str) -> FixedEnds:
-        """The same ends at other rows of their recording.  end, name, where : as of `place_balls`.
-
-        Raises RecordingError where a row has another end.
-        """
-        of_row = _indices(end, self.number)
-        unknown = np.unique(end[(end >= 0) & (of_row < 0)])
-        if len(unknown):
-            raise RecordingError.of(
-                where,
-                f"too few rows have {', '.join(name(int(number)) for number in unknown[:5])}: none is among "
-                "the rows that were drawn as a sample",
-                next_step="exclude these rows, or make a recording of them by itself",
-            )
-        return replace(self, of_row=of_row)
-
     @property
     def place_of_row_mm(self) -> FloatArray:
         """(N, 3) place of each row's end; nan where it has none."""

@@ -9,7 +9,8 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from compd.api import diagnose, open_whole_or_sample
+from compd.api import diagnose
+from compd.comparison import open_whole_or_sample
 from compd.configuration import Machine
 from compd.diagnosis import Diagnosis
 from compd.page.workbench.opened_recording import model_of
@@ -33,7 +34,7 @@ class Diagnosing:
         kept: None = None,
     ) -> None:
         """Arguments as for `DiagnosisJob`. Raises CompdError if the recording or the model cannot be opened."""
-        self._aligned, self._recorded_rows = open_whole_or_sample(path, machine)
+        self._aligned = open_whole_or_sample(path, machine)
         self._model, self._effects = model_of(model_path, self._aligned), effects
         self._diagnosis: Diagnosis | None = None
 
@@ -51,10 +52,9 @@ class Diagnosing:
         from compd.report import write_diagnosis_page
 
         assert self._diagnosis is not None
-        is_sample = self._aligned.recording.rows < self._recorded_rows
         with TemporaryDirectory() as directory:
             path = Path(directory) / "diagnosis.html"
-            write_diagnosis_page(path, self._diagnosis, [], recorded_rows=self._recorded_rows if is_sample else 0)
+            write_diagnosis_page(path, self._diagnosis, [])
             return gzip.compress(path.read_bytes())
 
 

@@ -9,9 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from compd.api import open_whole_or_sample
 from compd.arrays import FloatArray, IntArray, rms
-from compd.comparison import AlignedRecording, Comparison, compare
+from compd.comparison import AlignedRecording, Comparison, compare, open_whole_or_sample
 from compd.configuration import Machine
 from compd.model_file import ModelFile, read_model_file
 from compd.page.packed import packed
@@ -32,14 +31,13 @@ class OpenedRecording:
     """One recording against one model; a change of either makes another.
 
     path, model_path : of the recording and of the model file, which need not be there yet.
-    aligned : its rows; of a recording that is too long for the memory a sample of its `recorded_rows`.
+    aligned : its rows; of a recording that is too long for the memory a sample.
     start : the comparison without any effect, from which the error falls.
     """
 
     path: Path
     model_path: Path
     aligned: AlignedRecording
-    recorded_rows: int
     model: ModelFile
     start: Comparison
 
@@ -74,7 +72,7 @@ class OpenedRecording:
             "labels": self.aligned.labels,
             "unit": self.aligned.unit,
             "rows": len(self.aligned.rows),
-            "recorded_rows": self.recorded_rows,
+            "sample": comparison.basis,
             "rms": comparison.rms_um,
             "fall": fall(self.start, comparison),
             "floor": comparison.floor.um,
@@ -169,9 +167,9 @@ def open_for_page(path: Path, model_path: Path, machine: Machine | None = None) 
     Of a recording that is too long for the memory a sample is opened, spread evenly.
     Raises CompdError with every problem of either.
     """
-    aligned, recorded_rows = open_whole_or_sample(path, machine)
+    aligned = open_whole_or_sample(path, machine)
     model = model_of(model_path, aligned)
-    return OpenedRecording(path, model_path, aligned, recorded_rows, model, compare(aligned, ()))
+    return OpenedRecording(path, model_path, aligned, model, compare(aligned, ()))
 
 
 def model_of(path: Path | None, aligned: AlignedRecording) -> ModelFile:

@@ -14,6 +14,12 @@ from compd.comparison import Comparison
 from tests.support.external import write_external
 
 Compare: TypeAlias = Callable[[Path], Comparison]
+
+
+def compared_sample(path: Path) -> Comparison:
+    return compd.compare(compd.open_sample(path))
+
+
 DRIFT = np.linspace(-1, 1, 300)
 
 
@@ -28,7 +34,7 @@ def recorded(directory: Path, declared_um: float, drift_um: float, sigma_um: flo
 @pytest.mark.parametrize(
     ("declared_um", "drift_um", "sigma_um"), [(1.0, 0.0, 8.0), (10.0, 11.0, 6.5)], ids=["too small", "a drift"]
 )
-@pytest.mark.parametrize("compare", [compd.compare, compd.compare_stream])
+@pytest.mark.parametrize("compare", [compd.compare, compared_sample])
 def test_both_numbers_are_said(
     tmp_path: Path, declared_um: float, drift_um: float, sigma_um: float, compare: Compare
 ) -> None:
@@ -41,7 +47,7 @@ def test_both_numbers_are_said(
     assert comparison.as_json()["noise_floor_remark"] == comparison.floor.contradiction != ""
 
 
-@pytest.mark.parametrize("compare", [compd.compare, compd.compare_stream])
+@pytest.mark.parametrize("compare", [compd.compare, compared_sample])
 def test_a_declaration_that_rows_agree_with_stays(tmp_path: Path, compare: Compare) -> None:
     comparison = compare(recorded(tmp_path, 8.0, 0.0, 8.0))
     assert (comparison.floor.source, comparison.floor.um) == ("declared", 8.0)

@@ -157,7 +157,7 @@ def test_a_comparison_rests_on_the_criteria_of_its_recording(stage: AlignedRecor
     assert compd.compare(stage).trends
     assert compd.compare(stage).criteria == ComparisonCriteria()
     assert compd.diagnose(opened, effects=PLAY).before.trends == ()
-    assert compd.compare_stream(path, criteria=lenient).trends == ()
+    assert compd.compare(compd.open_sample(path, criteria=lenient)).trends == ()
 
 
 def test_more_disturbance_widens_the_standard_errors(stage: AlignedRecording) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import pickle
 from dataclasses import replace
 from datetime import UTC, datetime
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -12,9 +13,9 @@ import yaml
 
 import compd
 from compd.comparison import ComparisonCriteria
+from compd.comparison import open as open_module
 from compd.diagnosis import Criteria
 from compd.errors import CompdError
-from compd.fleet import machine_examination as module
 from compd.fleet.fleet_recording import FleetRecording
 from compd.fleet.machine_examination import examination
 from compd.fleet.recording_result import ABOVE_FLOOR
@@ -140,13 +141,14 @@ def test_what_a_result_follows_from_changes_its_basis(recording: Path, tmp_path:
     assert examination("diagnose").basis(FleetRecording(recording, "tripod-07")) == ""
 
 
-def test_a_long_recording_is_examined_block_by_block(
+def test_of_a_long_recording_a_sample_is_examined(
     recording: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     wanted = examination("compare", [tmp_path / "tripod-07.yaml"])
     in_memory = wanted(of(recording))
-    monkeypatch.setattr(module, "is_long", lambda path: True)
-    by_blocks = wanted(of(recording))
-    assert by_blocks.rms_before_um == pytest.approx(in_memory.rms_before_um, rel=1e-6)
-    assert by_blocks.rows == in_memory.rows
+    monkeypatch.setattr(open_module, "LONG_ROWS", 10)
+    monkeypatch.setattr(open_module, "open_sample", partial(open_module.open_sample, rows=100))
+    of_sample = wanted(of(recording))
+    assert of_sample.rms_before_um == pytest.approx(in_memory.rms_before_um, rel=0.1)
+    assert of_sample.rows < in_memory.rows
     assert examination("diagnose", [tmp_path / "tripod-07.yaml"])(of(recording)).effects == ("link_expansion",)

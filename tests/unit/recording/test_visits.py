@@ -11,8 +11,7 @@ from typer.testing import CliRunner
 import compd
 from compd.arrays import FloatArray
 from compd.cli.app import app
-from compd.recording import read_recording, recording_blocks
-from compd.recording.visits import VisitNumbers, file_numbers, pose_mm
+from compd.recording.visits import file_numbers, pose_mm, unique_visits
 
 SIDECAR = "format: 3\nmachine: external\nreference: {quantity: tool_position, frame: machine}\n"
 NOISE_UM, GROWTH_UM_PER_K = 1.0, 4.3
@@ -21,7 +20,7 @@ NOISE_UM, GROWTH_UM_PER_K = 1.0, 4.3
 def visits(number: list[int], session: list[int] | None = None, x_mm: list[float] | None = None) -> list[int]:
     place_mm = None if x_mm is None else np.array(x_mm)[:, None]
     of_session = None if session is None else np.array(session)
-    found = VisitNumbers().of_block(np.array(number), of_session, place_mm, None)
+    found = unique_visits(np.array(number), of_session, place_mm, None)[0]
     return [int(k) for k in np.unique(found, return_inverse=True)[1]]
 
 
@@ -30,7 +29,7 @@ def test_a_number_in_another_session_is_another_visit() -> None:
 
 
 def test_a_number_that_comes_back_is_another_visit() -> None:
-    found = VisitNumbers().of_block(np.array([1, 1, 2, 1, -1, 1]), None, None, None)
+    found = unique_visits(np.array([1, 1, 2, 1, -1, 1]), None, None, None)[0]
     assert len(set(found.tolist())) == 5
     assert file_numbers(found).tolist() == [1, 1, 2, 1, -1, 1]
     assert found[4] == -1
@@ -46,7 +45,7 @@ def test_rows_of_a_machine_that_creeps_are_no_repeats() -> None:
 
 def test_rows_of_reflectors_in_turn_are_repeats_of_each() -> None:
     number, target_mm = np.array([1, 2, 1, 2, 3, 4]), np.array([[0.0], [9.0]] * 3)
-    found = VisitNumbers().of_block(number, None, np.zeros((6, 1)), target_mm)
+    found = unique_visits(number, None, np.zeros((6, 1)), target_mm)[0]
     assert found.tolist() == number.tolist()
 
 
@@ -91,16 +90,7 @@ def test_visit_numbers_that_begin_again_hide_nothing(columns: str, tmp_path: Pat
     assert "numbers come back" in checked.output
 
 
-def test_blocks_have_the_visits_of_the_whole(tmp_path: Path) -> None:
-    path = four_sessions(tmp_path / "logged.csv")
-    whole = read_recording(path).visit
-    blocks = [block.visit for block in recording_blocks(path, rows=37)]
-    assert whole is not None
-    np.testing.assert_array_equal(np.concatenate([visit for visit in blocks if visit is not None]), whole)
-    assert len(np.unique(whole)) == 120
-
-
 def test_a_turn_at_the_same_place_is_another_visit() -> None:
     poses = pose_mm(np.zeros((4, 3)), np.array([[0.0, 0, 0], [1e-5, 0, 0], [0.05, 0, 0], [0.05, 0, 0]]))
-    found = VisitNumbers().of_block(np.ones(4, dtype=np.int64), None, poses, None)
+    found = unique_visits(np.ones(4, dtype=np.int64), None, poses, None)[0]
     assert found[0] == found[1] != found[2] == found[3]

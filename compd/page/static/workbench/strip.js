@@ -17,8 +17,8 @@ export class Strip {
   begin(bench) {
     this.bench = bench;
     this.left_out_rms = null;
-    const { verdict, trends, rows, recorded_rows } = bench.summary;
-    const sample = rows < recorded_rows ? [element("p", { class: "note", id: "sample" }, `Too long to be shown whole: everything here, also what is fitted, is of a sample of ${rows} of its ${recorded_rows} rows, spread evenly. The command lines go through all rows.`)] : [];
+    const { verdict, trends } = bench.summary;
+    const sample = bench.summary.sample ? [element("p", { class: "note", id: "sample" }, bench.summary.sample)] : [];
     this.said = element("p", {}, verdict);
     this.verdict.replaceChildren(this.said, ...sample, ...(trends.length ? [element("p", { class: "note" }, `${trends.slice(0, MAX_TRENDS).join("; ")}.`)] : []));
     this.try();

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 
 import pytest
 
-from compd.comparison import draw_sample
-from compd.comparison.stream import recording_stream
+import compd
+from compd.comparison import open as open_module
 from compd.page.workbench.workbench import Workbench
 from tests.support.measured import gauges, hidden, record
 
@@ -16,13 +17,13 @@ def test_it_opens_by_a_sample_and_says_so(tmp_path: Path, monkeypatch: pytest.Mo
     path = record(tmp_path, gauges(600, 1), [hidden("link_expansion", 2.0)])
     model = tmp_path / "tripod.model.yaml"
     whole = Workbench(path, model, None).summary()
-    assert whole["rows"] == whole["recorded_rows"] == 600
-    monkeypatch.setattr(recording_stream, "LONG_ROWS", 300)
-    monkeypatch.setattr(draw_sample, "__defaults__", (200, *(draw_sample.__defaults__ or ())[1:]))
+    assert (whole["rows"], whole["sample"]) == (600, "")
+    monkeypatch.setattr(open_module, "LONG_ROWS", 300)
+    monkeypatch.setattr(open_module, "open_sample", partial(compd.open_sample, rows=200))
     workbench = Workbench(path, model, None)
     summary = workbench.summary()
     assert 150 < summary["rows"] < 250
-    assert summary["recorded_rows"] == 600
+    assert f"{summary['rows']} of 600 rows" in summary["sample"]
     assert summary["rms"] == pytest.approx(whole["rms"], rel=0.15)
     step = workbench.propose("add", "link_expansion")
     before, after = step["rms"]
