@@ -64,7 +64,7 @@ demo: $(COMPILED)
 # A hidden effect, to be found in the browser: out/workbench has the recording, and its answer under seal.
 workbench: $(COMPILED)
 	@mkdir -p out/workbench
-	@$(BIN)/compd campaign config/tripod-cmm.yaml --hidden 8 --out out/workbench/hidden.csv --overwrite
+	@$(BIN)/compd sim campaign config/tripod-cmm.yaml --hidden 8 --out out/workbench/hidden.csv --overwrite
 	@$(BIN)/compd page --recordings out/workbench --models out/workbench --workbench hidden
 
 live: $(COMPILED)

@@ -13,7 +13,7 @@ import pytest
 import yaml
 from typer.testing import CliRunner
 
-from compd.cli.live import driver as driver_cli
+from compd.cli.live.gauge import driver as driver_cli
 from compd.plugins import GAUGES, load, names
 from tests.support.paths import ROOT
 

@@ -82,11 +82,6 @@ OutOption = Annotated[
 HtmlOption = Annotated[Path | None, typer.Option("--html", help="Write the page too; works offline.")]
 
 
-@fleet.callback()
-def _fleet() -> None:
-    """Examine the recordings of many machines, on all cores or on a Dask cluster."""
-
-
 @fleet.command()
 def compare(
     places: PlacesArgument,

@@ -1,4 +1,4 @@
-"""`compd compare`, `compd effect add | remove | fit | undo`, `compd ledger`, as a person types them."""
+"""`compd compare`, `compd model add | remove | fit | undo`, `compd model ledger`, as a person types them."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ import yaml
 from typer.testing import CliRunner
 
 from compd.cli.measurements.compare import compare
-from compd.cli.measurements.effect import add, fit, remove, undo
-from compd.cli.measurements.ledger import ledger
+from compd.cli.measurements.model.effect import add, fit, remove, undo
+from compd.cli.measurements.model.ledger import ledger
 from compd.errors import CompdError, RecordingError, StateError
 from compd.model_file import read_model_file
 from tests.support.external import write_external
@@ -133,7 +133,7 @@ def test_every_step_is_in_the_ledger_and_can_be_undone(recording: Path, tmp_path
     with pytest.raises(StateError, match="no step to undo"):
         run("undo", "--model", model)
     page = tmp_path / "ledger.html"
-    said = run("ledger", model, "--html", page)
+    said = run("model", "ledger", model, "--html", page)
     assert [step["kind"] for step in yaml.safe_load(model.read_text())["steps"]] == ["add", "add", "undo", "undo"]
     assert "undone" in said
     assert "The falling error" in page.read_text()
@@ -152,7 +152,7 @@ def test_the_ledger_is_in_the_unit_of_the_recordings(tmp_path: Path) -> None:
     assert not UM.search(said)
     run("add", "telescope:tf", "--recording", stars, "--model", model)
     run("undo", "--model", model)
-    said = run("ledger", model, "--html", page)
+    said = run("model", "ledger", model, "--html", page)
     assert "residuals in arcsec" in " ".join(said.split())
     text = re.sub(r"<script>.*?</script>", "", page.read_text(encoding="utf-8"), count=1, flags=re.S)
     assert "residual, arcsec rms" in text

@@ -1,4 +1,4 @@
-"""`compd effect list` and `compd effect show`."""
+"""`compd model effects` and `compd model effect`."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from compd.cli.measurements.effect import effect as command
+from compd.cli.measurements.model.effect import effect as command
 from compd.errors import CompdError
 from compd.model.library import BUNDLED
 from compd.report.effect_signature import compute_signature
@@ -112,7 +112,7 @@ def test_the_hysteresis_curve_is_a_loop() -> None:
 
 
 def add_formula(directory: Path, formula: str) -> str:
-    """What `compd effect add` of a formula says, of 30 rows with a temperature that changes."""
+    """What `compd model add` of a formula says, of 30 rows with a temperature that changes."""
     (directory / "mine.yaml").write_text(
         f"{{id: mine, port: link, formula: {formula}, physics: Grows., "
         "parameters: {k: {unit: um/K, plausible: [-10, 10], source: mine}}}"

@@ -11,8 +11,8 @@ from typing import Any
 import pytest
 from typer.testing import CliRunner
 
-from compd.cli.live import driver as driver_cli
-from compd.cli.live import gauge as gauge_cli
+from compd.cli.live.gauge import driver as driver_cli
+from compd.cli.live.gauge import gauge as gauge_cli
 from compd.clock import MonotonicClock
 from compd.configuration import load as load_machine
 from compd.errors import CompdError

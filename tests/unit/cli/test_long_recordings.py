@@ -13,7 +13,7 @@ from typer.testing import CliRunner
 import compd
 from compd.cli.measurements.compare import compare
 from compd.cli.measurements.diagnose import diagnose
-from compd.cli.measurements.effect import add, fit
+from compd.cli.measurements.model.effect import add, fit
 from compd.comparison import draw_sample
 from compd.comparison.stream import recording_stream
 from compd.model_file import read_model_file

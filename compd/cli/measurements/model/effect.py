@@ -1,4 +1,4 @@
-"""`compd effect`: the library of physical causes, and stepwise changes of a model file."""
+"""`compd model`: the library of physical causes, and stepwise changes of a model file."""
 
 from __future__ import annotations
 
@@ -27,13 +27,13 @@ RecordingOption = Annotated[
     Path, typer.Option("--recording", help="The recording for the fit: NAME.csv or NAME.parquet.")
 ]
 DryRunOption = Annotated[bool, typer.Option("--dry-run", help="Show the result without writing it.")]
-EFFECT_HELP = "An id from `compd effect list`; FILE.yaml with one effect, or FILE.yaml:ID; FILE.py:NAME."
+EFFECT_HELP = "An id from `compd model effects`; FILE.yaml with one effect, or FILE.yaml:ID; FILE.py:NAME."
 
 
-effect = typer.Typer(no_args_is_help=True, help="List and show physical causes, and add them to a model file.")
+effect = typer.Typer()
 
 
-@effect.command(name="list")
+@effect.command("effects")
 def list_effects(effects: EffectsOption = None) -> None:
     """List the installed effects, or those of --effects: port, required quantities, description."""
     from rich.console import Console
@@ -49,7 +49,7 @@ def list_effects(effects: EffectsOption = None) -> None:
     Console().print(table)
 
 
-@effect.command()
+@effect.command("effect")
 def show(
     name: Annotated[str, typer.Argument(metavar="EFFECT", help=EFFECT_HELP), PathKind.NAME_OR_FILE],
     machine: Annotated[
@@ -69,7 +69,7 @@ def show(
         from compd.report import check_page_path
 
         check_page_path(html, overwrite)
-    shown = named_effect(name, "compd effect show", gather_effects(effects or ()))
+    shown = named_effect(name, "compd model effect", gather_effects(effects or ()))
     configuration = load_machine(machine or "tripod-cmm")
     # an effect of one's own may belong to another machine than the shipped one
     Console().print(_card(shown, configuration if machine or not shown.declared else None))

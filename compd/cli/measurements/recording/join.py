@@ -1,4 +1,4 @@
-"""`compd join`: a reference instrument's export beside the gauges, by time, order, name or distance."""
+"""`compd recording join`: a reference instrument's export beside the gauges, by time, order, name or distance."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`compd ledger`: every step that changed a model, and the falling error."""
+"""`compd model ledger`: every step that changed a model, and the falling error."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def ledger(
     steps = stored.steps
     console = Console(highlight=False)
     if not steps:
-        console.print(f"{model}: no step yet; `compd effect add` makes the first")
+        console.print(f"{model}: no step yet; `compd model add` makes the first")
         return
     units = {step.unit for step in steps}
     shown = [k for k, name in enumerate(LEDGER_HEAD) if name != "unit" or len(units) > 1]

@@ -14,14 +14,7 @@ if TYPE_CHECKING:
     from compd.data_fault import DataFault
     from compd.recording import Recording
 
-recording = typer.Typer(
-    no_args_is_help=True, help="Check, change and merge recordings: readings of the machine beside a reference."
-)
-
-
-@recording.callback()
-def _recording() -> None:
-    """Check, change and merge recordings: readings of the machine beside a reference."""
+recording = typer.Typer()
 
 
 @recording.command()
@@ -90,7 +83,7 @@ def convert(
         Path,
         typer.Argument(
             help="The recording, NAME.csv or NAME.parquet, with NAME.yaml beside it; or NAME.arrow, left by a "
-            "`compd record` that was killed."
+            "`compd recording start` that was killed."
         ),
     ],
     destination: Annotated[Path, typer.Argument(help="What to write: NAME.parquet or NAME.csv.")],
@@ -192,7 +185,7 @@ def _sessions(contents: Recording) -> str:
 def _reference(contents: Recording) -> str:
     reference = contents.reference
     if reference is None:
-        return "none yet; put an instrument's export beside it with `compd join`"
+        return "none yet; put an instrument's export beside it with `compd recording join`"
     parts = [reference.quantity, ", ".join(contents.reference_columns)]
     if reference.of_fixed_places:
         parts.append("fixed places are fitted along")

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from compd.gauge_tools import GaugeStatistics, GaugeTarget
     from compd.lines import PortArguments
 
-gauge = typer.Typer(no_args_is_help=True, help="List, find, read, watch and describe gauges.")
+gauge = typer.Typer()
 
 TargetArgument = Annotated[
     str,

@@ -11,10 +11,7 @@ import typer
 
 from compd.cli.options import OverwriteOption
 
-machine = typer.Typer(
-    no_args_is_help=True,
-    help="Begin the configuration of a machine, draw one, and write its numbers for other programs.",
-)
+machine = typer.Typer()
 
 Kind: TypeAlias = Literal["6-ups", "6-pus", "6-rus", "3-spr", "3-rps", "3-prs", "linear-delta", "rotary-delta"]
 Tolerance: TypeAlias = Literal["ground", "measured", "machined", "printed", "hand-built"]
