@@ -157,7 +157,7 @@ wheel: $(STAMP) docs
 	$(BIN)/twine check --strict dist/*
 	$(PYTHON) -m venv build/wheel-test
 	build/wheel-test/bin/pip install --quiet --disable-pip-version-check dist/compd-*.whl
-	cd build && wheel-test/bin/compd --help && wheel-test/bin/compd check --drivers
+	cd build && wheel-test/bin/compd --help && wheel-test/bin/compd gauge list
 	test -s "$$(cd build && wheel-test/bin/compd docs --path)"
 	$(PYTEST) tests/system/test_wheel.py
 

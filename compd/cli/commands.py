@@ -17,7 +17,6 @@ from types import ModuleType
 import typer
 
 from compd.cli import live, measurements, simulated, start
-from compd.cli.option_groups import with_groups
 from compd.cli.plain_help import PlainCommand, PlainGroup
 from compd.release import __version__
 
@@ -70,8 +69,7 @@ def _commands(module: ModuleType) -> typer.Typer:
     if commands is not found:
         commands.command()(found)
     for command in commands.registered_commands:
-        assert command.callback is not None
-        command.cls, command.callback = PlainCommand, with_groups(command.callback)
+        command.cls = PlainCommand
     return commands
 
 

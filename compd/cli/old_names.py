@@ -8,6 +8,7 @@ from typing import Any
 from compd.cli.options import DEFAULT_SOCKET
 
 OLD_NAMES = {
+    "check --drivers": "gauge list",
     "effect list": "model effects",
     "effect show": "model effect",
     **{f"effect {step}": f"model {step}" for step in ("add", "remove", "fit", "undo")},

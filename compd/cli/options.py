@@ -50,6 +50,7 @@ HoldOption = Annotated[
         "or a single number, frame.x to target.c. May be repeated.",
     ),
 ]
+JsonOption = Annotated[bool, typer.Option("--json", help="Print the result as JSON, for programs.")]
 OverwriteOption = Annotated[bool, typer.Option("--overwrite", help="Overwrite a file of another kind.")]
 
 

@@ -9,12 +9,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from compd.cli.options import EffectsOption, HoldOption, MachineOption, OverwriteOption, RangesOption
+from compd.cli.option_groups import PageOptions, with_groups
+from compd.cli.options import EffectsOption, HoldOption, JsonOption, MachineOption, RangesOption
 
 if TYPE_CHECKING:
     from compd.comparison import AlignedRecording
 
 
+@with_groups
 def diagnose(
     recordings: Annotated[
         list[Path],
@@ -31,9 +33,8 @@ def diagnose(
     effects: EffectsOption = None,
     ranges: RangesOption = None,
     hold: HoldOption = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON, for programs.")] = False,
-    html: Annotated[Path | None, typer.Option("--html", help="Write the page with pictures; works offline.")] = None,
-    overwrite: OverwriteOption = False,
+    as_json: JsonOption = False,
+    page: PageOptions = PageOptions(),
 ) -> None:
     """Find the missing physical effect: twelve lines with the verdict and the next step, then the evidence.
 
@@ -46,19 +47,16 @@ def diagnose(
     from compd.diagnosis import evaluate_holdouts
     from compd.report import print_diagnosis
 
-    if html is not None:
-        from compd.report import check_page_path
-
-        check_page_path(html, overwrite)
+    page.check()
     sealed = [_open(path, machine, (), hold or ())[0] for path in recordings[1:]]
     aligned, all_rows = _open(recordings[0], machine, ranges or (), hold or ())
     with steps_shown(quiet=as_json) as progress:
         diagnosis = diagnose_recording(aligned, model, effects=effects or (), progress=progress)
     diagnosis, holdouts = evaluate_holdouts(diagnosis, sealed)
-    if html is not None:
+    if page.html is not None:
         from compd.report import write_diagnosis_page
 
-        write_diagnosis_page(html, diagnosis, holdouts, recorded_rows=all_rows)
+        write_diagnosis_page(page.html, diagnosis, holdouts, recorded_rows=all_rows)
     if as_json:
         data: dict[str, Any] = {**diagnosis.as_json(), "sealed": [holdout.as_json() for holdout in holdouts]}
         if all_rows:
@@ -68,8 +66,8 @@ def diagnose(
     print_diagnosis(Console(highlight=False), diagnosis, holdouts)
     if all_rows:
         typer.echo(f"From a sample of {aligned.recording.rows} rows of {all_rows}, spread evenly.")
-    if html is not None:
-        typer.echo(f"The same as pictures: {html}")
+    if page.html is not None:
+        typer.echo(f"The same as pictures: {page.html}")
 
 
 def _open(path: Path, machine: Path | None, ranges: Sequence[str], hold: Sequence[str]) -> tuple[AlignedRecording, int]:

@@ -133,7 +133,7 @@ def test_every_step_is_in_the_ledger_and_can_be_undone(recording: Path, tmp_path
     with pytest.raises(StateError, match="no step to undo"):
         run("undo", "--model", model)
     page = tmp_path / "ledger.html"
-    said = run("model", "ledger", model, "--html", page)
+    said = run("ledger", model, "--html", page)
     assert [step["kind"] for step in yaml.safe_load(model.read_text())["steps"]] == ["add", "add", "undo", "undo"]
     assert "undone" in said
     assert "The falling error" in page.read_text()
@@ -152,7 +152,7 @@ def test_the_ledger_is_in_the_unit_of_the_recordings(tmp_path: Path) -> None:
     assert not UM.search(said)
     run("add", "telescope:tf", "--recording", stars, "--model", model)
     run("undo", "--model", model)
-    said = run("model", "ledger", model, "--html", page)
+    said = run("ledger", model, "--html", page)
     assert "residuals in arcsec" in " ".join(said.split())
     text = re.sub(r"<script>.*?</script>", "", page.read_text(encoding="utf-8"), count=1, flags=re.S)
     assert "residual, arcsec rms" in text

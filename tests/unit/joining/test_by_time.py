@@ -7,11 +7,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from typer import Typer
 from typer.testing import CliRunner
 
 from compd.arrays import FloatArray
-from compd.cli.measurements.recording.join import join as join_command
+from compd.cli.app import app
 from compd.errors import RecordingError
 from compd.instruments import ReadOptions, Track, read_export
 from compd.instruments import track_of as track_of_export
@@ -24,13 +23,6 @@ from tests.support.two_clocks import TipPath, random_path, track_of
 
 SCALE_NOISE_MM, TRACKER_NOISE_MM = 1e-4, 0.005
 SIDECAR = {"machine": "tripod-cmm"}
-app = Typer()
-app.command()(join_command)
-
-
-@app.callback()
-def _several() -> None:
-    """Keeps `join` a command of its own, as in `compd`."""
 
 
 def gauges(path: Path, motion: TipPath, time_s: FloatArray, rng: np.random.Generator, **extra: FloatArray) -> Path:

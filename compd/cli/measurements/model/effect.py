@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 import typer
 
-from compd.cli.options import EffectsOption, HoldOption, MachineOption, OverwriteOption, RangesOption
+from compd.cli.option_groups import PageOptions, with_groups
+from compd.cli.options import EffectsOption, HoldOption, MachineOption, RangesOption
 from compd.cli.paths import PathKind
 
 if TYPE_CHECKING:
@@ -23,14 +24,20 @@ if TYPE_CHECKING:
     from compd.model_file import Declaration, ModelFile
 
 ModelOption = Annotated[Path, typer.Option("--model", help="The model file; `add` creates a missing one.")]
-RecordingOption = Annotated[
-    Path, typer.Option("--recording", help="The recording for the fit: NAME.csv or NAME.parquet.")
-]
-DryRunOption = Annotated[bool, typer.Option("--dry-run", help="Show the result without writing it.")]
 EFFECT_HELP = "An id from `compd model effects`; FILE.yaml with one effect, or FILE.yaml:ID; FILE.py:NAME."
 
 
 effect = typer.Typer()
+
+
+class StepOptions(NamedTuple):
+    """Options of every step that fits a model to a recording."""
+
+    recording: Annotated[Path, typer.Option("--recording", help="The recording for the fit: NAME.csv or NAME.parquet.")]
+    model: ModelOption
+    machine: MachineOption = None
+    hold: HoldOption = None
+    dry_run: Annotated[bool, typer.Option("--dry-run", help="Show the result without writing it.")] = False
 
 
 @effect.command("effects")
@@ -50,14 +57,14 @@ def list_effects(effects: EffectsOption = None) -> None:
 
 
 @effect.command("effect")
+@with_groups
 def show(
     name: Annotated[str, typer.Argument(metavar="EFFECT", help=EFFECT_HELP), PathKind.NAME_OR_FILE],
     machine: Annotated[
         Path | None, typer.Option("--machine", help="Machine configuration (YAML); default: the shipped tripod.")
     ] = None,
     effects: EffectsOption = None,
-    html: Annotated[Path | None, typer.Option("--html", help="Write a page with the effect's signature.")] = None,
-    overwrite: OverwriteOption = False,
+    page: PageOptions = PageOptions(),
 ) -> None:
     """Show one effect: its physics, its parameters, and with --html its displacement of a machine's tip."""
     from rich.console import Console
@@ -65,72 +72,58 @@ def show(
     from compd.configuration import load_machine
     from compd.model.library import gather_effects, named_effect
 
-    if html is not None:
-        from compd.report import check_page_path
-
-        check_page_path(html, overwrite)
+    page.check()
     shown = named_effect(name, "compd model effect", gather_effects(effects or ()))
     configuration = load_machine(machine or "tripod-cmm")
     # an effect of one's own may belong to another machine than the shipped one
     Console().print(_card(shown, configuration if machine or not shown.declared else None))
-    if html is not None:
+    if page.html is not None:
         from compd.report import write_effect_page
 
-        write_effect_page(html, shown, configuration)
-        typer.echo(f"{shown.id} on {configuration.machine}: {html}")
+        write_effect_page(page.html, shown, configuration)
+        typer.echo(f"{shown.id} on {configuration.machine}: {page.html}")
 
 
 @effect.command()
+@with_groups
 def add(
     name: Annotated[str, typer.Argument(metavar="EFFECT", help=EFFECT_HELP), PathKind.NAME_OR_FILE],
-    recording: RecordingOption,
-    model: ModelOption,
-    machine: MachineOption = None,
+    step: StepOptions,
     effects: EffectsOption = None,
     ranges: RangesOption = None,
-    hold: HoldOption = None,
-    dry_run: DryRunOption = False,
 ) -> None:
     """Add an effect to a model and fit all its effects together."""
     from compd.api import add_effect
 
-    aligned, refine = _open(recording, machine, ranges or (), hold or ())
-    before = _read_model(model, aligned) if model.exists() else None
+    aligned, refine = _open(step, ranges or ())
+    before = _read_model(step.model, aligned) if step.model.exists() else None
     changed = add_effect(before, name, aligned, effects=effects or (), refine=refine)
-    _finish(model, before, changed, aligned, f"added {changed.steps[-1].effect}", dry_run)
+    _finish(step, before, changed, aligned, f"added {changed.steps[-1].effect}")
 
 
 @effect.command()
+@with_groups
 def remove(
     name: Annotated[str, typer.Argument(metavar="EFFECT", help="The id of an effect in the model.")],
-    recording: RecordingOption,
-    model: ModelOption,
-    machine: MachineOption = None,
-    hold: HoldOption = None,
-    dry_run: DryRunOption = False,
+    step: StepOptions,
 ) -> None:
     """Take an effect out of a model and fit the others again."""
     from compd.model_changes import remove_effect
 
-    aligned, refine = _open(recording, machine, hold=hold or ())
-    before = _read_model(model, aligned)
-    _finish(model, before, remove_effect(before, name, aligned, refine), aligned, f"removed {name}", dry_run)
+    aligned, refine = _open(step)
+    before = _read_model(step.model, aligned)
+    _finish(step, before, remove_effect(before, name, aligned, refine), aligned, f"removed {name}")
 
 
 @effect.command()
-def fit(
-    recording: RecordingOption,
-    model: ModelOption,
-    machine: MachineOption = None,
-    hold: HoldOption = None,
-    dry_run: DryRunOption = False,
-) -> None:
+@with_groups
+def fit(step: StepOptions) -> None:
     """Fit all effects of a model again, on another recording."""
     from compd.model_changes import refit_model
 
-    aligned, refine = _open(recording, machine, hold=hold or ())
-    before = _read_model(model, aligned)
-    _finish(model, before, refit_model(before, aligned, refine), aligned, "fitted again", dry_run)
+    aligned, refine = _open(step)
+    before = _read_model(step.model, aligned)
+    _finish(step, before, refit_model(before, aligned, refine), aligned, "fitted again")
 
 
 @effect.command()
@@ -149,22 +142,21 @@ def _declared_id(declared: Declaration) -> str:
     return declared if isinstance(declared, str) else str(declared["id"])
 
 
-def _open(
-    path: Path, machine: Path | None, ranges: Sequence[str] = (), hold: Sequence[str] = ()
-) -> tuple[AlignedRecording, Refinement]:
+def _open(step: StepOptions, ranges: Sequence[str] = ()) -> tuple[AlignedRecording, Refinement]:
     """The recording; for one too long for the memory a sample, and the function that fits to all its rows."""
     from compd.comparison import is_long, open_recording
     from compd.model_changes import unrefined
 
+    path, hold = step.recording, step.hold or ()
     if not is_long(path):
-        return open_recording(path, machine, ranges=ranges, hold=hold), unrefined
+        return open_recording(path, step.machine, ranges=ranges, hold=hold), unrefined
     from compd.api import open_long
     from compd.cli.progress import count_shown
     from compd.table_file import row_count
 
     rows = row_count(path)
     with count_shown(rows, f"drawing a sample of {path.name}") as progress:
-        long = open_long(path, machine, progress, ranges=ranges, hold=hold)
+        long = open_long(path, step.machine, progress, ranges=ranges, hold=hold)
     aligned = long.sample.aligned
 
     def refine(result: FitResult, sigma_um: FloatArray) -> FitResult:
@@ -182,7 +174,7 @@ def _read_model(path: Path, aligned: AlignedRecording) -> ModelFile:
 
 
 def _finish(
-    path: Path, model: ModelFile | None, changed: ModelFile, aligned: AlignedRecording, done: str, dry_run: bool
+    step: StepOptions, model: ModelFile | None, changed: ModelFile, aligned: AlignedRecording, done: str
 ) -> None:
     """Write the file, unless it is a dry run, then print the step's result. model : before it, None for a new one."""
     from rich.console import Console
@@ -192,14 +184,14 @@ def _finish(
     from compd.display_unit import format_error
     from compd.report import keep_words_whole
 
-    if dry_run:
+    if step.dry_run:
         done = f"not written: would have {done}"
     else:
-        changed.write(path)
+        changed.write(step.model)
     before, after = compare(aligned, model), compare(aligned, changed)
     console = Console(highlight=False)
     console.print(
-        f"{path}: {done}; residual {format_error(before.rms_um, aligned.unit, 3)} -> "
+        f"{step.model}: {done}; residual {format_error(before.rms_um, aligned.unit, 3)} -> "
         f"{format_error(after.rms_um, aligned.unit, 3)}, floor ratio "
         f"{before.floor_ratio:.3g} -> {after.floor_ratio:.3g}"
     )

@@ -16,14 +16,15 @@ if TYPE_CHECKING:
 
 recording = typer.Typer()
 
+RecordingArgument = Annotated[
+    Path, typer.Argument(help="The recording, NAME.csv or NAME.parquet, with NAME.yaml beside it.")
+]
+
 
 @recording.command()
 def check(
-    path: Annotated[Path, typer.Argument(help="The recording, NAME.csv or NAME.parquet, with NAME.yaml beside it.")],
-    machine: Annotated[
-        Path | None,
-        typer.Option("--machine", help="The machine's configuration; a shipped one is found by its name."),
-    ] = None,
+    path: RecordingArgument,
+    machine: MachineOption = None,
 ) -> None:
     """Check a recording; report every problem at once, with file, row, column, value, what is allowed, next step."""
     from compd.comparison import read_with_machine
@@ -105,7 +106,7 @@ RowsOption = Annotated[
 
 @recording.command()
 def exclude(
-    path: Annotated[Path, typer.Argument(help="The recording, NAME.csv or NAME.parquet, with NAME.yaml beside it.")],
+    path: RecordingArgument,
     rows: RowsOption,
     reason: Annotated[str, typer.Option(help="Reason, kept in NAME.yaml.")],
 ) -> None:
@@ -119,7 +120,7 @@ def exclude(
 
 @recording.command()
 def include(
-    path: Annotated[Path, typer.Argument(help="The recording, NAME.csv or NAME.parquet, with NAME.yaml beside it.")],
+    path: RecordingArgument,
     rows: RowsOption,
 ) -> None:
     """Let rows count again after leaving them out."""
