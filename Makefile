@@ -65,7 +65,7 @@ demo: $(COMPILED)
 # A hidden effect, to be found in the browser: out/workbench has the recording, and its answer under seal.
 workbench: $(COMPILED)
 	@mkdir -p out/workbench
-	@$(BIN)/compd campaign config/tripod-cmm.yaml --hidden 8 --out out/workbench/hidden.csv --overwrite
+	@$(BIN)/compd sim campaign config/tripod-cmm.yaml --hidden 8 --out out/workbench/hidden.csv --overwrite
 	@$(BIN)/compd page --recordings out/workbench --models out/workbench --workbench hidden
 
 live: $(COMPILED)
@@ -158,7 +158,7 @@ wheel: $(STAMP) docs
 	$(BIN)/twine check --strict dist/*
 	$(PYTHON) -m venv build/wheel-test
 	build/wheel-test/bin/pip install --quiet --disable-pip-version-check dist/compd-*.whl
-	cd build && wheel-test/bin/compd --help && wheel-test/bin/compd check --drivers
+	cd build && wheel-test/bin/compd --help && wheel-test/bin/compd gauge list
 	test -s "$$(cd build && wheel-test/bin/compd docs --path)"
 	$(PYTEST) tests/system/test_wheel.py
 

@@ -40,9 +40,9 @@ Rules for every driver:
 A driver is found by an entry point of the group ``compd.gauges``, or named in the configuration as
 ``driver: /etc/compd/my_gauge.py:MyGauge``. One that calls a library which may keep the interpreter or crash belongs on
 a line with a process of its own, ``acquisition: {own_process: [LINE]}``. ``drivers/template`` is a complete package to
-copy, with a simulated device; ``compd driver test`` tries a driver on wires that go wrong. A gauge whose protocol the
-drivers `serial_ascii`, `serial_frame` or `modbus` can describe needs no class: it is a preset, a YAML file in a folder
-of the entry-point group ``compd.gauge_presets``.
+copy, with a simulated device; ``compd gauge test-driver`` tries a driver on wires that go wrong. A gauge whose protocol
+the drivers `serial_ascii`, `serial_frame` or `modbus` can describe needs no class: it is a preset, a YAML file in a
+folder of the entry-point group ``compd.gauge_presets``.
 """
 
 from __future__ import annotations
@@ -285,8 +285,8 @@ class Gauge(ABC, Generic[LineT]):
     line_kind : "bytes" for a `ByteLine`, "registers" for a `RegisterLine`, "nodes" of OPC UA, "topics" of MQTT.
     integrity : "checksum" where the driver itself checks one (a Modbus line does it for its drivers); "format" where
         only the shape of a reply tells damage.
-    sample_options : options, without `driver` and `line`, with which `compd driver test` tries the driver; None where
-        they must be given in a file.
+    sample_options : options, without `driver` and `line`, with which `compd gauge test-driver` tries the driver; None
+        where they must be given in a file.
     sample_range : lowest and highest value that the gauge can show with these options, in its channels' unit.
     absolute : whether the device shows the same value again after its power was off (an LVDT, an absolute encoder). One
         that counts from where it was switched on does not; False also where it is not known.

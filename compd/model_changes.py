@@ -39,7 +39,7 @@ def add_to_model(
     """
     if effect.id in [fitted.effect.id for fitted in model.fitted]:
         raise StateError.of(
-            f"effect {effect.id}", "is in the model already", next_step="`compd effect fit` fits it again"
+            f"effect {effect.id}", "is in the model already", next_step="`compd model fit` fits it again"
         )
     before = compare(aligned, model.fitted, model.covariance)
     kept = _as_counted(model.fitted, aligned.rows)
@@ -91,7 +91,7 @@ def refit_model(
     Raises StateError where there are none.
     """
     if not model.fitted:
-        raise StateError.of("model", "has no effect to fit", next_step="`compd effect add` adds one")
+        raise StateError.of("model", "has no effect to fit", next_step="`compd model add` adds one")
     before = compare(aligned, model.fitted, model.covariance)
     effects = [recounted(fitted.effect, aligned.rows) for fitted in model.fitted]
     unfitted = [

@@ -75,7 +75,7 @@ def check_ranges(ranges: Iterable[StatedRange], effects: Iterable[Effect]) -> No
                     "is of no effect's parameter",
                     value=name,
                     allowed=", ".join(of_effect) or "EFFECT.PARAMETER",
-                    next_step="`compd effect list` shows all effects, `compd effect show EFFECT` its parameters",
+                    next_step="`compd model effects` shows all effects, `compd model effect EFFECT` its parameters",
                 )
             )
         elif _factor(parameters[name], stated.unit) is None:

@@ -1,4 +1,4 @@
-"""The file of a planned measurement: `compd plan` writes it, `compd simulate` and `compd campaign` measure it.
+"""The file of a planned measurement: `compd plan` writes it, `compd sim run` and `compd sim campaign` measure it.
 
 CSV with one row per measurement, a header, `.` decimal, UTF-8:
 

@@ -146,7 +146,7 @@ class _NoCode:
             where,
             f"the {kind} is Python code, and this program executes no file",
             value=str(file),
-            next_step="use it on the command line: `compd compare`, `compd diagnose`, `compd effect`",
+            next_step="use it on the command line: `compd compare`, `compd diagnose`, `compd model`",
         )
 
 

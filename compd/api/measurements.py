@@ -109,7 +109,7 @@ def plan_measurement(
             "is in the model already",
             value=", ".join(present),
             allowed="effects that are not",
-            next_step="`compd effect remove` takes it out",
+            next_step="`compd model remove` takes it out",
         )
     given = _plan_limits(aligned, workspace_M_mm, force_N, temperature_degC, speed_mm_per_s, limits or {})
     sigma_um = compare(aligned, file.fitted, file.covariance).floor.by_axis_um

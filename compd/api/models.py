@@ -25,7 +25,7 @@ def open_model(path: str | Path, machine: Machine | None = None) -> ModelFile:
     Parameters
     ----------
     path : str or Path
-        The model file (YAML), as `ModelFile.write` and `compd effect add` write it.
+        The model file (YAML), as `ModelFile.write` and `compd model add` write it.
     machine : str, Path or Configuration, optional
         The machine as `load_machine` takes it. Left out, the configuration that comes with compd under the name in
         the file.

@@ -54,7 +54,7 @@ def built_geometry(configuration: Configuration, fitted: Sequence[FittedEffect])
             configuration.where("machine"),
             "compd knows no joints of this machine",
             value=configuration.machine,
-            next_step="write the effects into a model file: `compd effect add`",
+            next_step="write the effects into a model file: `compd model add`",
         )
     model = build_model(configuration.geometry, configuration.wiring)
     rows = _two_rows(model)

@@ -21,9 +21,11 @@ def main() -> None:
 
     with loading():
         from compd.cli.commands import make_app
+        from compd.cli.old_names import renamed
         from compd.errors import CompdError
 
-        app = make_app(*sys.argv[1:2])
+        sys.argv[1:] = renamed(sys.argv[1:])
+        app = make_app(*sys.argv[1:3])
     try:
         app()
     except CompdError as error:

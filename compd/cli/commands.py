@@ -1,15 +1,18 @@
 """`compd`: one command for each task.
 
 Each package here is a panel of `compd --help`, and each module in it a command: module `check` has a function `check`,
-or a `typer.Typer` of that name where the command has commands of its own. A new module is a new command; nothing else
-has to be edited. Commands import what they need when they run, so that `compd --help` is quick.
+or a `typer.Typer` of that name where the command has commands of its own. A package in a panel is a group: its
+docstring is the group's help, and its modules are the group's commands. A new module is a new command; nothing else has
+to be edited. Commands import what they need when they run, so that `compd --help` is quick.
 """
 
 from __future__ import annotations
 
 import os
 import pkgutil
+from collections.abc import Iterable, Sequence
 from importlib import import_module
+from types import ModuleType
 
 import typer
 
@@ -28,27 +31,46 @@ PANELS = {
 _COMPLETION = "_COMPD_COMPLETE"
 
 
-def make_app(wanted: str = "") -> typer.Typer:
-    """The command line. Where `wanted` is the name of a command it has this one alone, and is made sooner."""
+def make_app(*words: str) -> typer.Typer:
+    """The command line. Where `words` name a command, or one of a group, it has this one alone, and is made sooner."""
     app = typer.Typer(
         cls=PlainGroup, no_args_is_help=True, add_completion=_COMPLETION in os.environ, pretty_exceptions_enable=False
     )
     app.callback(cls=PlainGroup)(_options)
-    modules = [
-        (title, package.__name__, module.name)
-        for title, package in PANELS.items()
-        for module in pkgutil.iter_modules(package.__path__)
-    ]
-    alone = [module for module in modules if module[2] == wanted]
-    for title, package, name in alone or modules:
-        command = getattr(import_module(f"{package}.{name}"), name)
-        if isinstance(command, typer.Typer):
-            for inside in command.registered_commands:
-                inside.cls = PlainCommand
-            app.add_typer(command, name=name, cls=PlainGroup, rich_help_panel=title)
+    titles = {package.__name__: title for title, package in PANELS.items()}
+    for module in _modules(PANELS.values(), words[:1]):
+        panel, _, name = module.__name__.rpartition(".")
+        if hasattr(module, "__path__"):
+            group = typer.Typer(no_args_is_help=True, help=module.__doc__)
+            for inside in _modules([module], words[1:2]):
+                group.registered_commands += _commands(inside).registered_commands
         else:
-            app.command(cls=PlainCommand, rich_help_panel=title)(command)
+            group = _commands(module)
+            if group is not getattr(module, name):
+                group.registered_commands[0].rich_help_panel = titles[panel]
+                app.registered_commands += group.registered_commands
+                continue
+        app.add_typer(group, name=name, cls=PlainGroup, rich_help_panel=titles[panel])
     return app
+
+
+def _modules(packages: Iterable[ModuleType], wanted: Sequence[str]) -> list[ModuleType]:
+    """The modules in these packages that have a wanted name; all of them where none has."""
+    paths = [
+        f"{package.__name__}.{each.name}" for package in packages for each in pkgutil.iter_modules(package.__path__)
+    ]
+    return [import_module(path) for path in [path for path in paths if path.rpartition(".")[2] in wanted] or paths]
+
+
+def _commands(module: ModuleType) -> typer.Typer:
+    """The commands of a module."""
+    found = getattr(module, module.__name__.rpartition(".")[2])
+    commands = found if isinstance(found, typer.Typer) else typer.Typer()
+    if commands is not found:
+        commands.command()(found)
+    for command in commands.registered_commands:
+        command.cls = PlainCommand
+    return commands
 
 
 def _print_version(wanted: bool) -> None:

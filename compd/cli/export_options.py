@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import typer
 
@@ -29,89 +29,91 @@ class DateOrder(StrEnum):
     YMD = "ymd"
 
 
-ShapeOption = Annotated[
-    Shape | None,
-    typer.Option(
-        "--as",
-        help="The export's format, for a file that is mistaken for another: "
-        + ", ".join(f"{declared.name} ({declared.title})" for declared in instrument_formats().values())
-        + ".",
-    ),
-]
-ColumnsOption = Annotated[
-    str | None,
-    typer.Option(
-        "--columns",
-        help="Roles of the columns, in order: time, date, x, y, z, rx, ry, rz, length, name, visit, "
-        "reflector, group, collection, or - for one that is not used: name,x,y,z,-. With a unit: time[ms],x[inch].",
-    ),
-]
-UnitOption = Annotated[str | None, typer.Option("--unit", help="Unit of the lengths, if the file has none.")]
-AngleUnitOption = Annotated[str | None, typer.Option("--angle-unit", help="Unit of rx, ry, rz, if the file has none.")]
-AnglesOption = Annotated[
-    str | None,
-    typer.Option(
-        "--angles",
-        metavar="ORDER",
-        help="What rx, ry, rz are: vector; or the order of turning: xyz about fixed axes, XYZ about turned ones.",
-    ),
-]
-DecimalOption = Annotated[
-    str | None, typer.Option("--decimal", help="The decimal mark, '.' or ',', if the file is ambiguous.")
-]
-DatesOption = Annotated[
-    DateOrder | None, typer.Option("--dates", help="Order of day, month and year, if the file is ambiguous.")
-]
-RateOption = Annotated[float | None, typer.Option("--rate-hz", help="Rows per second, if rows have no time.")]
-ClockSetBackOption = Annotated[
-    bool,
-    typer.Option(
-        "--clock-set-back", help="The times fall by an hour, as summer time ended: the rows after it get one."
-    ),
-]
-GroupOption = Annotated[
-    str | None, typer.Option("--group", help="The group of points to take, if there are several; all for all.")
-]
-SheetOption = Annotated[str | None, typer.Option("--sheet", help="The sheet of a workbook, if there are several.")]
+class ExportForm(NamedTuple):
+    """The form of an instrument's export."""
+
+    shape: Annotated[
+        Shape | None,
+        typer.Option(
+            "--as",
+            help="The export's format, for a file that is mistaken for another: "
+            + ", ".join(f"{declared.name} ({declared.title})" for declared in instrument_formats().values())
+            + ".",
+        ),
+    ] = None
+    columns: Annotated[
+        str | None,
+        typer.Option(
+            "--columns",
+            help="Roles of the columns, in order: time, date, x, y, z, rx, ry, rz, length, name, visit, "
+            "reflector, group, collection, or - for one that is not used: name,x,y,z,-. With a unit: time[ms],x[inch].",
+        ),
+    ] = None
+    unit: Annotated[str | None, typer.Option("--unit", help="Unit of the lengths, if the file has none.")] = None
+    angle_unit: Annotated[
+        str | None, typer.Option("--angle-unit", help="Unit of rx, ry, rz, if the file has none.")
+    ] = None
+    angles: Annotated[
+        str | None,
+        typer.Option(
+            "--angles",
+            metavar="ORDER",
+            help="What rx, ry, rz are: vector; or the order of turning: xyz about fixed axes, XYZ about turned ones.",
+        ),
+    ] = None
+    decimal: Annotated[
+        str | None, typer.Option("--decimal", help="The decimal mark, '.' or ',', if the file is ambiguous.")
+    ] = None
+    dates: Annotated[
+        DateOrder | None, typer.Option("--dates", help="Order of day, month and year, if the file is ambiguous.")
+    ] = None
+    rate_hz: Annotated[float | None, typer.Option("--rate-hz", help="Rows per second, if rows have no time.")] = None
+    clock_set_back: Annotated[
+        bool,
+        typer.Option(
+            "--clock-set-back", help="The times fall by an hour, as summer time ended: the rows after it get one."
+        ),
+    ] = False
+    group: Annotated[
+        str | None, typer.Option("--group", help="The group of points to take, if there are several; all for all.")
+    ] = None
+    sheet: Annotated[str | None, typer.Option("--sheet", help="The sheet of a workbook, if there are several.")] = None
+
+    def read_as(self, names: Mapping[str, str | None], prefix: str = "--") -> ReadOptions:
+        """The options of the reader. Raises typer.BadParameter for an invalid decimal mark.
+
+        names : role -> a column's name.  prefix : of the options of this file.
+        """
+        from compd.instruments import ReadOptions
+
+        if self.decimal not in (None, ".", ","):
+            raise typer.BadParameter("is . or ,", param_hint=f"{prefix}decimal")
+        given: dict[str, Any] = self._asdict()
+        given |= {key: each.value for key, each in given.items() if isinstance(each, StrEnum)}
+        given["columns"] = tuple(self.columns.split(",")) if self.columns else ()
+        return ReadOptions(**given, names={role: name for role, name in names.items() if name is not None})
 
 
-def read_options(
-    shape: Shape | None,
-    columns: str | None,
-    names: Mapping[str, str | None],
-    unit: str | None,
-    angle_unit: str | None,
-    decimal: str | None,
-    dates: DateOrder | None,
-    rate_hz: float | None,
-    group: str | None,
-    sheet: str | None,
-    clock_set_back: bool = False,
-    angles: str | None = None,
-    prefix: str = "--",
-) -> ReadOptions:
-    """The options of the reader. Raises typer.BadParameter for an invalid decimal mark.
+class LogForm(NamedTuple):
+    """The form of the machine's own log: each as the one of the export without `log_`."""
 
-    names : role -> a column's name.  prefix : of the options of this file.
-    """
-    from compd.instruments import ReadOptions
+    log_shape: Annotated[Shape | None, typer.Option("--log-as", help="The log's format, as --as of the export.")] = None
+    log_sheet: Annotated[str | None, typer.Option(help="The log's sheet, if it has several.")] = None
+    log_decimal: Annotated[str | None, typer.Option(help="The log's decimal mark, if it is ambiguous.")] = None
+    log_dates: Annotated[DateOrder | None, typer.Option(help="The log's order of dates, if it is ambiguous.")] = None
+    log_angles: Annotated[
+        str | None,
+        typer.Option(metavar="ORDER", help="What the log's angles are, as --angles of the export."),
+    ] = None
+    log_clock_set_back: Annotated[
+        bool, typer.Option("--log-clock-set-back", help="The log's times fall by an hour, as summer time ended.")
+    ] = False
 
-    if decimal not in (None, ".", ","):
-        raise typer.BadParameter("is . or ,", param_hint=f"{prefix}decimal")
-    return ReadOptions(
-        shape=shape.value if shape else None,
-        columns=tuple(columns.split(",")) if columns else (),
-        names={role: name for role, name in names.items() if name is not None},
-        unit=unit,
-        angle_unit=angle_unit,
-        angles=angles,
-        decimal=decimal,
-        dates=dates.value if dates else None,
-        rate_hz=rate_hz,
-        group=group,
-        sheet=sheet,
-        clock_set_back=clock_set_back,
-    )
+    @property
+    def read_as(self) -> ReadOptions:
+        """The options of the reader."""
+        export = ExportForm(**{key.removeprefix("log_"): value for key, value in self._asdict().items()})
+        return export.read_as({}, "--log-")
 
 
 def echo_taken(path: Path, shape: str, taken: Mapping[str, str], left_out: Mapping[str, int]) -> None:

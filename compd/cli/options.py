@@ -16,7 +16,7 @@ DEFAULT_SOCKET = "/run/compd/compd.sock"
 
 DaemonOption = Annotated[
     str,
-    typer.Option("--daemon", help="The daemon's Unix socket, or the configuration (YAML) that names it."),
+    typer.Option("--daemon", help="The daemon: its Unix socket, its host:port, or its configuration (YAML)."),
     PathKind.NAME_OR_FILE,
 ]
 MachineOption = Annotated[
@@ -50,19 +50,21 @@ HoldOption = Annotated[
         "or a single number, frame.x to target.c. May be repeated.",
     ),
 ]
+JsonOption = Annotated[bool, typer.Option("--json", help="Print the result as JSON, for programs.")]
 OverwriteOption = Annotated[bool, typer.Option("--overwrite", help="Overwrite a file of another kind.")]
 
 
-def unix_address(address: str) -> str:
-    """An address as it is; for a configuration file, the Unix socket that it names."""
-    configuration = addressed_configuration(address)
-    return address if configuration is None else configuration.sockets.unix.path
+def daemon_address(daemon: str) -> str:
+    """The daemon's host:port, or the path of its Unix socket with a slash in it, from what `--daemon` names it by."""
+    if configuration := daemon_configuration(daemon):
+        return configuration.sockets.unix.path
+    return daemon if "/" in daemon or ":" in daemon else f"./{daemon}"
 
 
-def addressed_configuration(address: str) -> Configuration | None:
-    """The configuration that an address is the file of; None for a socket."""
-    if not address.endswith((".yaml", ".yml")):
+def daemon_configuration(daemon: str) -> Configuration | None:
+    """The configuration that `--daemon` names; None for a socket."""
+    if not daemon.endswith((".yaml", ".yml")):
         return None
     from compd.configuration import load
 
-    return load(Path(address))
+    return load(Path(daemon))

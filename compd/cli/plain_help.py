@@ -7,6 +7,7 @@ from typing import Any, TypeVar
 
 from typer.core import TyperCommand, TyperGroup
 
+from compd.cli.old_names import take_address
 from compd.cli.paths import check_paths
 
 Printed = TypeVar("Printed")
@@ -18,7 +19,11 @@ class PlainCommand(TyperCommand):
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Parse the words of the command line. Raises CompdError for a path that is empty or a folder."""
         typed = list(args)
+        ctx.allow_extra_args = True
         rest: list[str] = super().parse_args(ctx, args)
+        take_address(ctx, rest)
+        if rest and not ctx.resilient_parsing:
+            ctx.fail(f"Got unexpected extra argument{'s' * (len(rest) > 1)} ({' '.join(rest)})")
         if self.callback is not None and not ctx.resilient_parsing:
             check_paths(self.callback, ctx.params, typed)
         return rest

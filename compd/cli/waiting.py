@@ -50,11 +50,11 @@ def connect_patiently(address: str, connect: Callable[[str], Client], clock: Clo
     address : host:port, Unix socket, or the configuration that names one.  connect : as `compd.client.connect`.
     Raises DaemonError, ConfigurationError.
     """
-    from compd.cli.options import unix_address
+    from compd.cli.options import daemon_address
 
     if address.endswith((".yaml", ".yml")):
         wait_for_file(Path(address), clock)
-    path = unix_address(address)
+    path = daemon_address(address)
     clients: list[Client] = []
 
     def is_there() -> bool:

@@ -363,7 +363,7 @@ def gauges_of(
                     document.where(location),
                     "needs `driver:`",
                     value=value_text(raw.get("driver", "") if isinstance(raw, dict) else raw, location),
-                    next_step="`compd check --drivers` lists them",
+                    next_step="`compd gauge list` lists them",
                 )
             )
             continue

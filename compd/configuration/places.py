@@ -48,7 +48,7 @@ def place_problems(document: Document, sockets: SocketSettings | None, state: St
                 document.where(("state", "model_file")),
                 "there is no such file",
                 value=state.model_file,
-                next_step="`compd effect add` writes a model file; or leave the key out",
+                next_step="`compd model add` writes a model file; or leave the key out",
             )
         )
     for location, path, *_ in _directories(sockets, state):

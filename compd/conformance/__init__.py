@@ -1,4 +1,4 @@
-"""Every driver against every fault that a wire can have: `compd driver test`."""
+"""Every driver against every fault that a wire can have: `compd gauge test-driver`."""
 
 import lazy_loader
 

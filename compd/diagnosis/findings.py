@@ -128,7 +128,7 @@ class EmpiricalFinding:
     heldout_rms_um : float
         Error on rows that were left out with the term, um per coordinate.
     formula_effects : tuple of dict
-        The term as formulas that `add_effect` and `compd effect add` take, the largest direction first.
+        The term as formulas that `add_effect` and `compd model add` take, the largest direction first.
     parameters : tuple of dict
         Fitted values by name, one mapping for each of `formula_effects`.
     beside : tuple of str

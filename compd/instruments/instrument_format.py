@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class WrittenForm:
-    """One form in which the simulated instrument writes a format: a name of `compd tracker --as`.
+    """One form in which the simulated instrument writes a format: a name of `compd sim tracker --as`.
 
     Attributes
     ----------
@@ -57,7 +57,7 @@ class WrittenForm:
 
 @dataclass(frozen=True, kw_only=True)
 class InstrumentFormat:
-    """A format of exports: a name of `compd join --as`.
+    """A format of exports: a name of `compd recording join --as`.
 
     Attributes
     ----------

@@ -72,7 +72,7 @@ def decode_text(path: Path, content: bytes, limits: ReadLimits) -> TextFile:
             text.count("\n", 0, control.start()) + 1,
             "is not text",
             f"a byte 0x{ord(control[0]):02x}",
-            "text, or a file of a format that `compd join --help` lists at --as",
+            "text, or a file of a format that `compd recording join --help` lists at --as",
             "export as text from the instrument's program",
         )
     problems.check()

@@ -1,4 +1,4 @@
-"""Joins a recording of gauges and an instrument's export by the options of `compd join`."""
+"""Joins a recording of gauges and an instrument's export by the options of `compd recording join`."""
 
 from __future__ import annotations
 
@@ -80,7 +80,7 @@ def unfit_option(by: JoinBy, options: JoinOptions) -> str:
 
 
 def match_export(gauges: Path, export: InstrumentExport, options: JoinOptions) -> JoinResult | RestJoin:
-    """The result of `compd join` before it is written.
+    """The result of `compd recording join` before it is written.
 
     gauges : a recording of gauges alone, NAME.csv or NAME.parquet.
     Raises RecordingError with every reason why the two cannot be told to belong together, or an option is not fit.

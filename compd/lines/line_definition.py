@@ -95,7 +95,7 @@ class PolledDefinition(LineDefinition):
     ----------
     over_network : whether there is no baud rate, and no damage that a checksum of the network lets through.
     broadcast_answered : whether a write to unit 0 is answered, as one over Modbus TCP is.
-    tries_drivers : whether `compd driver test` tries drivers on it.
+    tries_drivers : whether `compd gauge test-driver` tries drivers on it.
     """
 
     over_network: ClassVar[bool]

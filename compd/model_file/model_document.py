@@ -182,7 +182,7 @@ MODEL = FileKind(
     frozenset({"machine", "effects"}),
     least=2,
     others=frozenset(ModelDocument.model_fields),
-    next_step="`compd effect add` writes one",
+    next_step="`compd model add` writes one",
 )
 
 

@@ -174,7 +174,7 @@ class ModelFile:
         Parameters
         ----------
         path : str or Path
-            Where to. `compd adopt` takes the file into the running daemon.
+            Where to. `compd model adopt` takes the file into the running daemon.
 
         Raises
         ------

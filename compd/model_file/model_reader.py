@@ -53,7 +53,7 @@ def read_model_file(
             "was fitted on another geometry of this machine",
             value=stored.geometry,
             allowed=geometry,
-            next_step="fit it again with `compd effect fit`",
+            next_step="fit it again with `compd model fit`",
         )
     problems: list[Problem] = []
     found: list[tuple[Effect, EffectEntry, str]] = []
@@ -79,7 +79,7 @@ def read_model_file(
                 "has another size than the parameters",
                 value=str(covariance.shape),
                 allowed=f"({parameters}, {parameters})",
-                next_step="fit it again with `compd effect fit`",
+                next_step="fit it again with `compd model fit`",
             )
         )
     with_covariance = () if problems else with_own_covariance(fitted, covariance)
@@ -107,7 +107,7 @@ def _warnings(document: ModelDocument, fitted: Sequence[FittedEffect], links: in
         yield Problem(
             str(path),
             "has no checksum: what was changed in it after it was written cannot be seen",
-            next_step="`compd effect fit` writes one",
+            next_step="`compd model fit` writes one",
         )
     needed = dict.fromkeys(chain.from_iterable(needed_quantities(effect.effect, links) for effect in fitted))
     if unknown := [name for name in needed if name not in document.fitted_range]:
@@ -115,7 +115,7 @@ def _warnings(document: ModelDocument, fitted: Sequence[FittedEffect], links: in
             str(path),
             "does not say in which range it was fitted: its effects are extrapolated without a limit",
             value=", ".join(unknown),
-            next_step="fit it again with `compd effect fit`",
+            next_step="fit it again with `compd model fit`",
         )
 
 
@@ -139,7 +139,7 @@ def _fitted_effect(effect: Effect, entry: EffectEntry, links: int, where: str, p
                 f"has not the parameters of {effect.id}",
                 value=", ".join(values),
                 allowed=", ".join(names),
-                next_step="fit it again with `compd effect fit`",
+                next_step="fit it again with `compd model fit`",
             )
         )
         return FittedEffect(effect, np.zeros(len(columns)))
@@ -175,7 +175,7 @@ def _fitted_effect(effect: Effect, entry: EffectEntry, links: int, where: str, p
                 where,
                 f"has not the shape constants of {effect.id}",
                 allowed=", ".join(missing),
-                next_step="remove the effect and add it again: `compd effect add` searches them",
+                next_step="remove the effect and add it again: `compd model add` searches them",
             )
         )
     return FittedEffect(effect, theta, shape)

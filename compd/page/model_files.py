@@ -16,7 +16,7 @@ from compd.documents import MAX_BYTES
 from compd.files import open_regular, read_descriptor
 from compd.page.recordings import is_own
 
-# Suffix of files written by `compd effect add --model my.model.yaml`; copies beside recordings have another one.
+# Suffix of files written by `compd model add --model my.model.yaml`; copies beside recordings have another one.
 PATTERN = "*model.yaml"
 # Most files in the list: more than a person reads, and a limit for an overfull directory.
 MOST = 200

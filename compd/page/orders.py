@@ -122,7 +122,7 @@ class Orders:
 
     def _zero(self, subject: str) -> Consequence:
         status, machine = self._link.status, self._link.machine
-        command = self._command("zero", self._link.path, *(["--yes"] if subject == "replace" else []))
+        command = self._command("zero", "--daemon", self._link.path, *(["--yes"] if subject == "replace" else []))
         if status is None or machine is None:
             return Consequence(False, "The daemon has not told its status yet.", command)
         gauges = sum(wire["kind"] != "quantity" for wire in machine["wiring"])
@@ -146,10 +146,10 @@ class Orders:
 
     def _shadow(self, subject: str) -> Consequence:
         if not subject:
-            command = self._command("shadow", "--none", "--daemon", self._link.path)
+            command = self._command("model", "shadow", "--none", "--daemon", self._link.path)
             return Consequence(True, "No model runs beside the applied one any more.", command)
         path = self._files.path_of(subject)
-        command = self._command("shadow", "FILE" if path is None else str(path), "--daemon", self._link.path)
+        command = self._command("model", "shadow", "FILE" if path is None else str(path), "--daemon", self._link.path)
         if path is None:
             return Consequence(False, f"{_NOT_OFFERED}: {_NAME_IT}.", command)
         text = "The daemon tries the file. It is computed beside the applied model; nothing of it reaches the machine."
@@ -159,7 +159,7 @@ class Orders:
         """Consequence of adopting the shadow model. subject : its file's name, its hash, or ""."""
         running = (self._link.models or {}).get("shadow", {})
         file, hash_ = str(running.get("file", "")), str(running.get("model", ""))
-        command = self._command("adopt", file or "FILE", "--daemon", self._link.path)
+        command = self._command("model", "adopt", file or "FILE", "--daemon", self._link.path)
         if why := self._is_another(subject, file, hash_):
             return Consequence(False, why, command)
         setpoint = (self._link.readings or {}).get("setpoint", {})
@@ -192,7 +192,7 @@ class Orders:
         return "" if same else f"{file} runs as a shadow, not {path} as it is now: let it run first."
 
     def _no_model(self, subject: str) -> Consequence:
-        command = self._command("adopt", "--none", "--daemon", self._link.path)
+        command = self._command("model", "adopt", "--none", "--daemon", self._link.path)
         contributions = (self._link.readings or {}).get("setpoint", {}).get("sources_mm")
         if contributions is None:
             return Consequence(

@@ -1,4 +1,4 @@
-"""Recordings of this machine: the files in a directory, and `compd record` controlled from the page."""
+"""Recordings of this machine: the files in a directory, and `compd recording start` controlled from the page."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _END_WITHIN_S = 10.0
 
 @dataclass
 class Running:
-    """A running `compd record`. started_s : Unix time."""
+    """A running `compd recording start`. started_s : Unix time."""
 
     name: str
     command: str
@@ -66,7 +66,7 @@ class Recordings:
 
     def command(self, name: str, burst_s: float | None) -> list[str]:
         """The command line that records."""
-        words = ["compd", "record", str(self.directory / name), "--daemon", self._socket]
+        words = ["compd", "recording", "start", str(self.directory / name), "--daemon", self._socket]
         return words if burst_s is None else [*words, "--burst", f"{burst_s:g}"]
 
     async def start(self, name: str, burst_s: float | None) -> str:

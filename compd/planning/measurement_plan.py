@@ -140,14 +140,14 @@ class MeasurementPlan:
         feed_mm_per_min: float | None = None,
         dwell_s: float = DWELL_S,
     ) -> None:
-        """Write the rows, for a person at the machine, for `compd simulate --plan`, or for instrument and controller.
+        """Write the rows, for a person at the machine, for `compd sim run --plan`, or for instrument and controller.
 
         Parameters
         ----------
         path : str or Path
             Where to; an existing file is replaced.
         format : str
-            ``"plan"``: CSV, as `compd simulate --plan` reads it. Targets for the instrument, named P001 ...: ``"sa"``
+            ``"plan"``: CSV, as `compd sim run --plan` reads it. Targets for the instrument, named P001 ...: ``"sa"``
             (SpatialAnalyzer ASCII) or ``"csv"``. ``"gcode"``: a programme for the controller.
         feed_mm_per_min, dwell_s : float
             For G-code: the feed between places, which is needed, and the time at rest at each.

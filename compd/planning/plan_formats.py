@@ -30,7 +30,7 @@ _NAME_DIGITS = 3
 
 
 def target_name(row: int) -> str:
-    """Name of the row's target, by which `compd join --by name` finds it again: "P007"."""
+    """Name of the row's target, by which `compd recording join --by name` finds it again: "P007"."""
     return f"P{row:0{_NAME_DIGITS}d}"
 
 

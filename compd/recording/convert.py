@@ -33,7 +33,7 @@ def convert_recording(
 
     Parameters
     ----------
-    source : NAME.csv, NAME.parquet or NAME.yaml; or NAME.arrow, which `compd record` left when it was killed.
+    source : NAME.csv, NAME.parquet or NAME.yaml; or NAME.arrow, which `compd recording start` left when it was killed.
     destination : .csv or .parquet. Where it differs from the source in the suffix alone, they share the sidecar.
     overwrite : whether existing files are replaced.
     progress : called with the rows that are written so far.

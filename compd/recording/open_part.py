@@ -74,7 +74,7 @@ class OpenPart:
             raise RecordingError.of(
                 str(self._path),
                 "is no Arrow stream, or ends before its first row",
-                allowed="what `compd record --format parquet` left",
+                allowed="what `compd recording start --format parquet` left",
             ) from error
 
 

@@ -17,7 +17,7 @@ def read_recording(path: Path, configuration: Configuration | None = None, needs
     """Read and check the recording `path` (NAME.csv or NAME.parquet) with its sidecar NAME.yaml beside it.
 
     configuration : the machine that it must fit; without one, only the files are compared with each other.
-    needs_reference : False admits gauges alone (no `reference:` in the sidecar), for `compd join`.
+    needs_reference : False admits gauges alone (no `reference:` in the sidecar), for `compd recording join`.
 
     Raises RecordingError with every problem: file, row, column, value, what is allowed, next step.
     """

@@ -281,7 +281,7 @@ def _no_reference(sidecar: Sidecar) -> Problem:
         allowed="`reference:` with its `quantity:`",
         next_step="write reference: {quantity: tool_position, frame: machine}"
         if sidecar.external
-        else "put an instrument's export beside the gauges with `compd join`",
+        else "put an instrument's export beside the gauges with `compd recording join`",
     )
 
 

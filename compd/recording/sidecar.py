@@ -161,8 +161,8 @@ SECTIONS: Mapping[str, Any] = {
         BeforeValidator(_text_or_nothing),
         Field(
             description="the machine's configuration, as a path from the sidecar's directory; left out for a machine "
-            "that comes with compd, and where `--machine` names it. `compd join --machine FILE` and "
-            "`compd record --daemon FILE.yaml` write it"
+            "that comes with compd, and where `--machine` names it. `compd recording join --machine FILE` and "
+            "`compd recording start --daemon FILE.yaml` write it"
         ),
     ],
     "reference": Annotated[
@@ -224,7 +224,7 @@ class Sidecar:
     Attributes
     ----------
     machine : name of a machine configuration, or "external".
-    reference : None in a recording of gauges alone, to which `compd join` adds one.
+    reference : None in a recording of gauges alone, to which `compd recording join` adds one.
     folds : what cross-validation leaves out: "time", "place" or columns; empty where the sidecar does not say.
     excluded : spreadsheet row (header = 1) -> the person's reason.
     provenance, notes : how the recording came to be; kept, never interpreted.

@@ -154,7 +154,7 @@ def _description_panels(diagnosis: Diagnosis, fall: ErrorFall) -> list[Panel]:
         figure, caption = plot_step(diagnosis.after, effects, fall, described)
         panels.append(Panel(f"With and without {covariate}", caption, figure))
     caption = (
-        "To lower the error until the cause is known: a file of effects, as `compd effect add FILE.yaml:ID` and "
+        "To lower the error until the cause is known: a file of effects, as `compd model add FILE.yaml:ID` and "
         "`compd diagnose --effects FILE.yaml` take it."
     )
     return [*panels, Panel("As formulas", caption, PageText(formula_list(diagnosis)))]

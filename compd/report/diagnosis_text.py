@@ -69,7 +69,7 @@ def _print_findings(console: Console, diagnosis: Diagnosis, fall: ErrorFall) -> 
     first = formulas.partition("id: ")[2].partition("\n")[0]
     recording = diagnosis.before.aligned.recording.path.name
     _heading(console, f"To lower the error until the cause is known, save this as {FORMULA_FILE} and add each:")
-    command = f"compd effect add {FORMULA_FILE}:{first} --recording {recording} --model FILE"
+    command = f"compd model add {FORMULA_FILE}:{first} --recording {recording} --model FILE"
     console.print(Text(command), soft_wrap=True)
     console.print(Text(formulas.rstrip("\n")), soft_wrap=True)
 

@@ -36,7 +36,7 @@ def write_ledger_page(path: Path, model: StoredModel) -> None:
         ),
         Panel(
             "Every step",
-            "Each can be taken back with `compd effect undo`.",
+            "Each can be taken back with `compd model undo`.",
             PageTable(LEDGER_HEAD, ledger_rows(model)),
         ),
     ]

@@ -199,6 +199,6 @@ def _damaged(path: Path) -> Problem:
     return Problem(
         str(path),
         "is no Parquet file, or a part of one: its end is missing or damaged",
-        next_step="copy or export it again; what `compd record` left after a kill is NAME.arrow, see `compd recording "
-        "convert`",
+        next_step="copy or export it again; what `compd recording start` left after a kill is NAME.arrow, see "
+        "`compd recording convert`",
     )

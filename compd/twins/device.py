@@ -35,7 +35,7 @@ class SimulatedByteDevice(ABC):
     def speak(self) -> bytes:
         """What it says where no bytes ask it: unasked, time after time, or to a pulse of DTR; b"" where it does not.
 
-        `compd driver test` plays both. On the ptys and ports of a simulated machine it is not heard.
+        `compd gauge test-driver` plays both. On the ptys and ports of a simulated machine it is not heard.
         """
         return b""
 

@@ -12,7 +12,7 @@ class Case:
     """A simulated machine with hidden causes.
 
     name : of its files.  title : its heading.  machine : of a shipped configuration.
-    effects : ids of the causes, as `compd campaign --effect` takes them.  seed : of machine, weather and noise.
+    effects : ids of the causes, as `compd sim campaign --effect` takes them.  seed : of machine, weather and noise.
     verdict : the kind of verdict that `look_at` is written for; the gallery is not made with another.
     look_at : what the case shows, and where on its page.
     """
@@ -29,7 +29,16 @@ class Case:
     def campaign_command(self) -> list[str]:
         """The command that simulates the measurement to learn from."""
         effects = [part for effect in self.effects for part in ("--effect", effect)]
-        return ["campaign", f"config/{self.machine}.yaml", "--seed", str(self.seed), *effects, "--out", "learn.csv"]
+        return [
+            "sim",
+            "campaign",
+            f"config/{self.machine}.yaml",
+            "--seed",
+            str(self.seed),
+            *effects,
+            "--out",
+            "learn.csv",
+        ]
 
     @property
     def other_days_command(self) -> list[str]:

@@ -30,7 +30,7 @@ INTRODUCTION = f"""\
 The result of `compd compare`, the verdict of `compd diagnose`, and what `compd fleet report` and `compd calibrate`
 name rest on the numbers of this page. What else stands as a number in the program is rounding, the end of an iteration,
 the definition of a published method, memory and time, or the form of sentences and plans; `compd.diagnosis.criteria`
-states the rule. How a recording is joined and read has its own limits, beyond which `compd join` and
+states the rule. How a recording is joined and read has its own limits, beyond which `compd recording join` and
 `compd recording check` ask or refuse.
 
 Each has its default, its unit, its meaning, and the reason for its value; a reason that begins with "A choice" says

@@ -9,7 +9,7 @@ from docs.generate.markdown import code, escape, heading, join, link, sentence, 
 
 INTRODUCTION = f"""\
 An {term("effect")} is one physical cause of error. It adds something at one place of the machine, its {term("port")},
-and the kinematics carries that to the tip. compd knows these {len(BUNDLED)}; `compd effect show ID --html page.html`
+and the kinematics carries that to the tip. compd knows these {len(BUNDLED)}; `compd model effect ID --html page.html`
 draws what one of them does to the tip of your machine. [Add an effect](../how-to/add-an-effect.md) says how to fit one,
 and how to write your own as a [formula](model-file.md) or with code.
 

@@ -1,4 +1,4 @@
-"""The page of instrument formats: those that `compd join` reads, and the forms that `compd tracker` writes."""
+"""The page of instrument formats: what `compd recording join` reads, and the forms that `compd sim tracker` writes."""
 
 from __future__ import annotations
 
@@ -6,11 +6,11 @@ from compd.instruments import instrument_formats, written_forms
 from docs.generate.markdown import code, escape, heading, join, sentence, table
 
 INTRODUCTION = """\
-`compd join` reads the export of an instrument in any of these formats. It recognises the format by the content of the
-file, and prints it. See [join an instrument](../how-to/join-an-instrument.md).
+`compd recording join` reads the export of an instrument in any of these formats. It recognises the format by the
+content of the file, and prints it. See [join an instrument](../how-to/join-an-instrument.md).
 """
 WRITTEN = """\
-`compd tracker` lets the simulated instrument write an export in any of these forms.
+`compd sim tracker` lets the simulated instrument write an export in any of these forms.
 """
 # Between these lines the how-to guide includes the table.
 BEGIN, END = "<!-- formats: begin -->", "<!-- formats: end -->"

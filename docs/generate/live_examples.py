@@ -75,7 +75,7 @@ def exchanges() -> Mapping[str, Exchange]:
         directory = Path(temporary)
         tripod = shipped_configuration("tripod-cmm.yaml")
         address = str(directory / "compd.sock")
-        simulate = ["simulate", str(tripod), "--directory", temporary, "--zero-hold", "600"]
+        simulate = ["sim", "run", str(tripod), "--directory", temporary, "--zero-hold", "600"]
         commands = [
             Command(simulate, ready=directory / "control.sock"),
             Command(["run", str(directory / tripod.name)], ready=Path(address)),

@@ -31,11 +31,12 @@ from docs.generate.schema import ModelSchema, default_text
 
 INTRODUCTION = f"""\
 The {term("model file")} holds what a machine has beyond its geometry: its effects with their fitted parameters, and
-every step by which they came to be. `compd effect add`, `remove`, `fit` and `undo` write it; `compd compare --model`,
-`compd diagnose --model` and the daemon (`state.model_file`, `compd adopt`) read it. It is written whole or not at all.
+every step by which they came to be. `compd model add`, `remove`, `fit` and `undo` write it; `compd compare --model`,
+`compd diagnose --model` and the daemon (`state.model_file`, `compd model adopt`) read it. It is written whole or not at
+all.
 """
 FORMULA = """\
-An effect that the library lacks can be written as a formula, without code, in a YAML file of its own that `compd effect
+An effect that the library lacks can be written as a formula, without code, in a YAML file of its own that `compd model
 add FILE.yaml` takes, or under `effect:` in the model file. It is linear in what is fitted: every term holds a parameter
 as a factor. A parameter in which the formula is not linear becomes a constant, and is searched within its plausible
 range.

@@ -18,8 +18,8 @@ from docs.generate.schema import ModelSchema
 INTRODUCTION = f"""\
 A {term("recording")} is what a machine's gauges showed, row by row, with or without a {term("reference")} instrument
 beside it. It is two files: `NAME.csv` or `NAME.parquet`, one row per instant, and `NAME.yaml`, the sidecar. A
-spreadsheet can write CSV; `compd record` writes either from the running daemon, and `compd join` adds an instrument's
-export. `compd recording check NAME.csv` reports every mistake at once. See [join an
+spreadsheet can write CSV; `compd recording start` writes either from the running daemon, and `compd recording join`
+adds an instrument's export. `compd recording check NAME.csv` reports every mistake at once. See [join an
 instrument](../how-to/join-an-instrument.md) and [record and replay](../how-to/record-and-replay.md).
 """
 TABLE_RULES = """\
@@ -39,13 +39,13 @@ Anything else that was measured is a column `<name>_<unit>` in lower case, such 
 without unit ends in `_1`. `compd diagnose` tries every such column as an explanation of the error.
 """
 CYCLES = f"""\
-`compd record` also writes `NAME{CYCLES_SUFFIX}`: first the daemon's `VERSION` and its answer to `WATCH`, then for every
-row the [`READINGS`](#protocol-readings) message as it came, line for line. Each message has all that its cycle computed
-from, so `compd replay` computes the same setpoint again: bit for bit with the kernels that `VERSION` names
-(`computed_by`), within 1e-12 mm with others. Model files that were in use are copied beside it.
+`compd recording start` also writes `NAME{CYCLES_SUFFIX}`: first the daemon's `VERSION` and its answer to `WATCH`, then
+for every row the [`READINGS`](#protocol-readings) message as it came, line for line. Each message has all that its
+cycle computed from, so `compd recording replay` computes the same setpoint again: bit for bit with the kernels that
+`VERSION` names (`computed_by`), within 1e-12 mm with others. Model files that were in use are copied beside it.
 
-`compd record --format parquet` writes the open part as `NAME.arrow`, an Arrow stream of the same columns, which can be
-read to its last whole batch whatever ends the process; a part that is closed is `NAME.parquet`.
+`compd recording start --format parquet` writes the open part as `NAME.arrow`, an Arrow stream of the same columns,
+which can be read to its last whole batch whatever ends the process; a part that is closed is `NAME.parquet`.
 """
 
 

@@ -51,11 +51,11 @@ class Example:
 
 
 def make_example() -> Example:
-    """Simulate the recording and diagnose it, as `compd campaign` and `compd diagnose` do."""
+    """Simulate the recording and diagnose it, as `compd sim campaign` and `compd diagnose` do."""
     with _temporary_directory():
         shape = [str(shipped_configuration("tripod-cmm.yaml")), "--seed", str(SEED), "--effect", HIDDEN]
         with redirect_stdout(StringIO()):
-            app(["campaign", *shape, "--out", "loaded.csv"], standalone_mode=False)
+            app(["sim", "campaign", *shape, "--out", "loaded.csv"], standalone_mode=False)
         aligned = open_recording(Path("loaded.csv"))
     effects = list(load_library().values())
     explanation = explain_residual(compare(aligned), effects)

@@ -112,7 +112,9 @@ class Preset(DescriptionSection):
     chosen_channels: str = Field(
         default="", description="the option that names which of `channels` are read; all of them if left out"
     )
-    sample: dict[str, Any] = Field(default={}, description="options with which `compd driver test` tries the preset")
+    sample: dict[str, Any] = Field(
+        default={}, description="options with which `compd gauge test-driver` tries the preset"
+    )
     sample_range: tuple[float, float] | None = Field(
         default=None, description="[lowest, highest] that it can show with them, in its channels' unit"
     )

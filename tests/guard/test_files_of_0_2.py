@@ -1,7 +1,7 @@
 """Files that release 0.2.0 wrote are read: configurations, machine zeros, model files, recordings and their cycles.
 
-files-0.2/: made by the code of 0.2.0. `compd campaign --seed 3 --effect link_expansion`, every sixteenth row of it;
-`compd effect add link_expansion` on the whole; 8 cycles of a day of each machine, from the 4th on with that model.
+files-0.2/: made by the code of 0.2.0. `compd sim campaign --seed 3 --effect link_expansion`, every sixteenth row of it;
+`compd model add link_expansion` on the whole; 8 cycles of a day of each machine, from the 4th on with that model.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from compd.cli.live.replay import replay as replay_command
+from compd.cli.measurements.recording.replay import replay as replay_command
 from compd.comparison import open_recording
 from compd.configuration import load
 from compd.live.machine import load_zero

@@ -125,7 +125,7 @@ class InjectedMachine:
             options += ["--effect", f"{EXPANSION}={EXPANSION_PPM_PER_K}"]
             self._changes = {**self._changes, "state": {"model_file": str(self.directory / "expands.yaml")}}
             file_with(self.directory / "expands.yaml", EXPANSION, **{EXPANSION: EXPANSION_PPM_PER_K})
-        commands = [Command(["simulate", str(CONFIG / TRIPOD), *options], ready=wires / "control.sock")]
+        commands = [Command(["sim", "run", str(CONFIG / TRIPOD), *options], ready=wires / "control.sock")]
         ports.mkdir()
         with _preferred():
             running.enter_context(run_commands(commands, log=self.directory / "simulate.log"))

@@ -67,7 +67,7 @@ class CorrectedLinuxCnc:
 
     def _start(self, running: ExitStack) -> None:
         options = ["--seed", str(self._seed), "--speedup", str(self._speedup), "--zero-hold", "3600"]
-        simulate = ["simulate", str(CONFIG / HEXAPOD), "--directory", str(self.directory), *options]
+        simulate = ["sim", "run", str(CONFIG / HEXAPOD), "--directory", str(self.directory), *options]
         ready = self.directory / "control.sock"
         running.enter_context(run_commands([Command(simulate, ready)], log=self.directory / "simulate.log"))
         ports = self.directory / "injected"

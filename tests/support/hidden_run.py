@@ -112,9 +112,9 @@ class HiddenRun:
             wait_for_gauges(observer, daemon.watch(10.0))
         for _ in range(ZERO_TRIES - 1):
             # on a busy computer a line may be late for a moment
-            if self._compd("zero", self.socket).returncode == 0:
+            if self._compd("zero", "--daemon", self.socket).returncode == 0:
                 return
-        self.compd("zero", self.socket)
+        self.compd("zero", "--daemon", self.socket)
 
     def drive(self, visit: Visit) -> None:
         """Drive to a visit's place with its load and heaters, and rest there."""
@@ -155,12 +155,16 @@ class HiddenRun:
     def survey(self, visits: Sequence[Visit], name: str) -> tuple[Path, float]:
         """Record and track the visits; returns the joined recording and the tip's error during them, um."""
         part, track, joined = (self.directory / f"{name}{suffix}" for suffix in ("-0001.csv", ".track.csv", ".csv"))
-        recorder = self.beside("record", name, "--daemon", self.socket, "--rate-hz", str(RECORDER_HZ), begins="begins")
-        tracker = self.beside("tracker", self.directory, "--out", track, begins="looks")
+        recorder = self.beside(
+            "recording", "start", name, "--daemon", self.socket, "--rate-hz", str(RECORDER_HZ), begins="begins"
+        )
+        tracker = self.beside("sim", "tracker", self.directory, "--out", track, begins="looks")
         with recorder, tracker:
             error_um = self.tip_error_um(visits)
         self.outputs.append(
-            self.compd("join", part, track, joined, "--frame", "machine", "--sigma-um", str(TRACKER_SIGMA_UM))
+            self.compd(
+                "recording", "join", part, track, joined, "--frame", "machine", "--sigma-um", str(TRACKER_SIGMA_UM)
+            )
         )
         return joined, error_um
 
@@ -194,13 +198,13 @@ def _is_of_this_rest(setpoint: dict[str, Any], since_s: float) -> bool:
 
 @contextmanager
 def hidden_run(directory: Path, *options: str, configuration: Path | None = None) -> Iterator[HiddenRun]:
-    """`compd simulate` with `options`, and `compd run` on its wires; machine zero is taken.
+    """`compd sim run` with `options`, and `compd run` on its wires; machine zero is taken.
 
     configuration : of another machine than the tripod of `write_configuration`.
     """
     config = configuration or write_configuration(directory)
     machine = directory / "machine"
-    simulate = ["simulate", str(config), "--directory", str(machine), "--zero-hold", "600", *options]
+    simulate = ["sim", "run", str(config), "--directory", str(machine), "--zero-hold", "600", *options]
     commands = [
         Command(simulate, ready=machine / "control.sock"),
         Command(["run", str(machine / config.name)], ready=machine / "compd.sock"),

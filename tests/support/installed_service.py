@@ -111,7 +111,7 @@ def simulate(container: Container, program: Path) -> None:
 
 def take_zero(container: Container, program: Path) -> None:
     """Take machine zero of the simulated machine."""
-    zero = (str(program), "zero", str(SOCKET))
+    zero = (str(program), "zero")
     # on a busy computer a simulated gauge is late now and then
     wait_until(lambda: "taken" in container.run(*zero, check=False), "machine zero", PATIENCE_S)
 

@@ -54,7 +54,7 @@ class LivePage:
 
 @contextmanager
 def served(*options: str, name: str = "tripod-cmm.yaml", simulate: Sequence[str] = AT_REST) -> Iterator[LivePage]:
-    """A machine with its zero taken, and its page; `options`: of `compd page`, `simulate`: of `compd simulate`."""
+    """A machine with its zero taken, and its page; `options`: of `compd page`, `simulate`: of `compd sim run`."""
     with running_machine(name, simulate) as (directory, machine):
         recordings = directory / "recordings"
         with page_process(directory / "compd.sock", recordings, *options) as (address, pid):
@@ -77,7 +77,7 @@ def running_machine(
         patient.write_text(made_patient(shipped.read_text()))
         commands = [
             Command(
-                ["simulate", str(patient), "--directory", str(directory), *simulate],
+                ["sim", "run", str(patient), "--directory", str(directory), *simulate],
                 ready=directory / "control.sock",
             ),
             Command(["run", str(directory / shipped.name)], ready=directory / "compd.sock"),
@@ -94,7 +94,7 @@ def page_process(unix_socket: Path, recordings: Path, *options: str) -> Iterator
 
     What else it prints is in `page.log` beside the directory of recordings.
     """
-    words = ["page", str(unix_socket), "--port", "0", "--recordings", str(recordings), *options]
+    words = ["page", "--daemon", str(unix_socket), "--port", "0", "--recordings", str(recordings), *options]
     with (recordings.parent / "page.log").open("wb") as log:
         process = subprocess.Popen(
             [sys.executable, "-m", "compd", *words], stdout=subprocess.PIPE, stderr=log, text=True

@@ -55,7 +55,7 @@ class Machine:
 
     def __enter__(self) -> Self:
         wires = self.directory / "wires"
-        simulate = ["simulate", str(CONFIG / TRIPOD), "--directory", str(wires), "--seed", "3", "--zero-hold", "3600"]
+        simulate = ["sim", "run", str(CONFIG / TRIPOD), "--directory", str(wires), "--seed", "3", "--zero-hold", "3600"]
         self._running.enter_context(
             run_commands([Command(simulate, ready=wires / "control.sock")], log=self.directory / "simulate.log")
         )

@@ -24,7 +24,7 @@ from tests.support.hidden_run import HiddenRun, write_unhurried
 from tests.support.hidden_visits import Visit
 from tests.support.simulated import run_directory
 
-# So many that `compd join` finds the clocks' offset.
+# So many that `compd recording join` finds the clocks' offset.
 POSES, CHECKS = 32, 5
 TIMEOUT_S = 600
 # Standard deviation of each coordinate of a joint, as built.
@@ -56,7 +56,7 @@ def visits(drawing: Path) -> list[Visit]:
 def daemon(machine: Path, wires: Path, control: ControlClient) -> Iterator[HiddenRun]:
     """The daemon with a machine's numbers on the simulated machine's wires; zero is taken where that machine has it.
 
-    wires : the configuration that `compd simulate` wrote.
+    wires : the configuration that `compd sim run` wrote.
     """
     data, numbers = read_document(wires).data, read_document(machine).data
     state = wires.with_name(f"state-{machine.stem}")
@@ -78,7 +78,7 @@ def test_the_daemon_with_the_machine_as_built_has_its_tip_where_it_is() -> None:
     with run_directory() as directory:
         drawing, workshop = written(directory)
         wires, as_built = directory / "machine" / workshop.name, directory / "as-built.yaml"
-        simulate = ["simulate", str(workshop), "--directory", str(wires.parent), "--zero-hold", "600"]
+        simulate = ["sim", "run", str(workshop), "--directory", str(wires.parent), "--zero-hold", "600"]
         control = wires.with_name("control.sock")
         with run_commands([Command(simulate, ready=control)], log=directory / "simulate.log"):
             poses = visits(drawing)

@@ -85,7 +85,8 @@ def chain(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Chain]:
     patient = tmp_path_factory.mktemp("patient") / TRIPOD.name
     patient.write_text(made_patient(TRIPOD.read_text()))
     simulate = [
-        "simulate",
+        "sim",
+        "run",
         str(patient),
         "--directory",
         str(directory),

@@ -122,9 +122,9 @@ def test_all_walks_together_are_in_order_and_seen(copy: Copy) -> None:
     for check in ("ruff check", "ruff format --check", "lint-imports"):
         copy.run(check)
     assert "xy_md02" in copy.run("compd gauge list")
-    assert "frame_comparator_drift" in copy.run("compd effect list")
+    assert "frame_comparator_drift" in copy.run("compd model effects")
     assert " status " in copy.run("compd --help")
-    assert "gsi (Leica GSI)" in " ".join(copy.run("COLUMNS=250 compd join --help").split())
+    assert "gsi (Leica GSI)" in " ".join(copy.run("COLUMNS=250 compd recording join --help").split())
 
 
 @pytest.mark.long

@@ -105,7 +105,7 @@ def add_named_effects(run: HiddenRun, verdict: dict[str, Any], recording: Path, 
         path.write_text(yaml.safe_dump(formula), encoding="utf-8")
         named.append(str(path))
     for effect in named:
-        run.compd("effect", "add", effect, "--recording", recording, "--machine", run.configuration, "--model", model)
+        run.compd("model", "add", effect, "--recording", recording, "--machine", run.configuration, "--model", model)
 
 
 def zero_temperature_degC(hidden: list[int]) -> float:
@@ -125,7 +125,7 @@ def run_hidden(hidden: list[int], directory: Path, pace: Pace = HOURS) -> Outcom
         model = run.directory / "model.yaml"
         add_named_effects(run, verdict, recording, model)
         if model.exists():
-            run.compd("adopt", model, "--daemon", run.socket)
+            run.compd("model", "adopt", model, "--daemon", run.socket)
         after_um = run.tip_error_um(check_visits(3, CHECKS, heaters=pace.heaters))
     secret = json.loads((run.directory / "hidden.answer.json").read_text(encoding="utf-8"))
     return Outcome(compared, verdict, before_um, after_um, secret)

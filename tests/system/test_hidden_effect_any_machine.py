@@ -106,8 +106,8 @@ def test_a_hidden_effect_is_found_and_the_live_error_falls(name: str) -> None:
         assert verdict["verdict"] in ("identified", "likely", "ambiguous")
         model = run.directory / "model.yaml"
         for effect in named:
-            run.compd("effect", "add", effect, "--recording", recording, "--model", model, *own)
-        run.compd("adopt", model, "--daemon", run.socket)
+            run.compd("model", "add", effect, "--recording", recording, "--model", model, *own)
+        run.compd("model", "adopt", model, "--daemon", run.socket)
         after_um = run.tip_error_um(checks)
         floor_um = parse_output(run.compd("compare", recording, "--json", *own))["noise_floor_um"]
     causes = {cause.partition("=")[0] for cause in machine.hidden}

@@ -48,7 +48,7 @@ def test_found_as_in_the_campaigns_own_recording(tmp_path: Path, number: int, by
     files = simulate_campaign("tripod-cmm", tmp_path / "campaign.csv", seed=number, hidden=number)
     gauges, listed = split(files.recording, tmp_path)
     out = tmp_path / "joined.csv"
-    words = ["join", str(gauges), str(listed), str(out), "--by", by, "--unit", "mm", "--sigma-um", "0.15"]
+    words = ["recording", "join", str(gauges), str(listed), str(out), "--by", by, "--unit", "mm", "--sigma-um", "0.15"]
     result = CliRunner().invoke(app, words)
     assert result.exit_code == 0, result.output
     assert f"joined by {by}: " in result.output

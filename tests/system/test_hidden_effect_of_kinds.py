@@ -52,7 +52,7 @@ def test_what_a_number_hides_is_found_and_the_live_error_falls(kind: str) -> Non
         configuration = load(path)
         number = plain_number(kind, configuration)
         mechanism = Mechanism(configuration.geometry)
-        # `compd join` needs the more places to find the clocks, the more scales there are
+        # `compd recording join` needs the more places to find the clocks, the more scales there are
         visits = VISITS * (mechanism.scales - 1) // 2
         survey_mm, check_mm = (
             draw_points_mm(mechanism, np.random.default_rng(seed), count // 2)
@@ -65,8 +65,8 @@ def test_what_a_number_hides_is_found_and_the_live_error_falls(kind: str) -> Non
             verdict = parse_output(run.compd("diagnose", recording, "--json", *own))
             model = run.directory / "model.yaml"
             for step in verdict["steps"]:
-                run.compd("effect", "add", step["effect"], "--recording", recording, "--model", model, *own)
-            run.compd("adopt", model, "--daemon", run.socket)
+                run.compd("model", "add", step["effect"], "--recording", recording, "--model", model, *own)
+            run.compd("model", "adopt", model, "--daemon", run.socket)
             after_um = run.tip_error_um(visits_to(check_mm, 3))
             (answer,) = run.directory.glob("**/*answer.json")
             (hidden,) = json.loads(answer.read_text(encoding="utf-8"))["answers"]

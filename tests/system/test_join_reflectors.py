@@ -54,7 +54,18 @@ def run(*arguments: object) -> str:
 
 def join(directory: Path, out: str, *options: str) -> Path:
     files = (directory / "log.csv", directory / "points.csv", directory / out)
-    run("join", *files, "--machine", directory / "6-ups.yaml", "--log", "pose=point", "--by", "name", *options)
+    run(
+        "recording",
+        "join",
+        *files,
+        "--machine",
+        directory / "6-ups.yaml",
+        "--log",
+        "pose=point",
+        "--by",
+        "name",
+        *options,
+    )
     return directory / out
 
 
@@ -102,7 +113,7 @@ def test_what_was_joined_calibrates(measured: Path) -> None:
     ],
 )
 def test_what_is_not_said_of_reflectors_is_asked(measured: Path, tmp_path: Path, options: list[str], said: str) -> None:
-    arguments = ["join", measured / "log.csv", measured / "points.csv", tmp_path / "out.csv"]
+    arguments = ["recording", "join", measured / "log.csv", measured / "points.csv", tmp_path / "out.csv"]
     arguments += ["--machine", measured / "6-ups.yaml", "--log", "pose=point", "--by", "name", *options]
     failed = CliRunner().invoke(app, list(map(str, arguments)))
     assert failed.exit_code != 0

@@ -16,7 +16,7 @@ import yaml
 from typer.testing import CliRunner
 
 from compd.cli.app import app
-from compd.cli.simulated.simulate import _planned
+from compd.cli.simulated.sim.run import _planned
 from compd.configuration import load
 from compd.errors import CompdError
 from compd.recording import read_recording
@@ -50,7 +50,7 @@ def names(verdict: dict[str, Any]) -> set[str]:
 def test_a_planned_measurement_leaves_one_name(tmp_path: Path, hidden: str) -> None:
     """Loads of one size and direction leave two names; the plan's loads, on the same machine, leave the right one."""
     first, poor, plan, second, both = (tmp_path / f"{n}.csv" for n in ("first", "poor", "plan", "second", "both"))
-    machine = ("campaign", TRIPOD, "--seed", "5", "--effect", hidden)
+    machine = ("sim", "campaign", TRIPOD, "--seed", "5", "--effect", hidden)
     compd(*machine, "--out", first)
     thin(first, poor, straight_down)
     before = diagnosed(poor)
@@ -71,7 +71,7 @@ def short(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A recording of three planned rows."""
     path = tmp_path_factory.mktemp("short") / "short.csv"
     rows = [{"tip_x_mm": 10.0}, {"tip_y_mm": 10.0}, {"speed_mm_per_s": 5.0, "approach_1": 1}]
-    compd("campaign", TRIPOD, "--plan", plan_file(path.with_suffix(".plan.csv"), rows), "--out", path)
+    compd("sim", "campaign", TRIPOD, "--plan", plan_file(path.with_suffix(".plan.csv"), rows), "--out", path)
     return path
 
 
@@ -196,7 +196,7 @@ def test_without_a_plan_there_is_nothing_to_go_through() -> None:
 def test_a_wrong_plan_is_said_before_the_machine_starts(tmp_path: Path) -> None:
     path = plan_file(tmp_path / "next.csv", [{"force_x_N": 5.0, "tip_x_mm": "far"}], ["force_x_N"])
     with pytest.raises(CompdError) as caught:
-        compd("simulate", TRIPOD, "--directory", tmp_path / "machine", "--plan", path)
+        compd("sim", "run", TRIPOD, "--directory", tmp_path / "machine", "--plan", path)
     assert [one.what for one in caught.value.problems] == [
         "no gauge of this machine measures it: no recording will tell",
         "text where a number belongs",

@@ -57,7 +57,7 @@ def machine_and_daemon(directory: Path, machine: Path, *options: str) -> Iterato
     """The simulated machine at rest, the daemon for it with machine zero taken, and the machine's control socket."""
     wires = directory / "wires"
     control = wires / "control.sock"
-    simulate = ["simulate", str(machine), "--directory", str(wires), "--seed", "3", "--zero-hold", "3600", *options]
+    simulate = ["sim", "run", str(machine), "--directory", str(wires), "--seed", "3", "--zero-hold", "3600", *options]
     with run_commands([Command(simulate, ready=control)], log=directory / "simulate.log"):
         data = yaml.safe_load((wires / MACHINE).read_text())
         data["loop"]["rate_hz"] = RATE_HZ

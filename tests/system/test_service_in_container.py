@@ -95,7 +95,7 @@ def report_return(what: str, service: Service, from_s: float, ok_s: float) -> No
 def test_the_unit_is_active_and_its_setpoints_are_ok(service: Service) -> None:
     assert service.shown("ActiveState") == "active"
     assert service.shown("SubState") == "running"
-    watch = (f"{COMPD}/bin/compd", "watch", str(SOCKET), "--count=3", "--json")
+    watch = (f"{COMPD}/bin/compd", "watch", "--daemon", str(SOCKET), "--count=3", "--json")
     wait_until(lambda: '"state": "ok"' in service.container.run(*watch), "setpoints that are ok", PATIENCE_S)
     print("\n".join(re.findall(r"(?m)event=granted what.*|event=\"not permitted\".*", service.log())))
 

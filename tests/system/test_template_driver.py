@@ -13,7 +13,7 @@ import pytest
 import yaml
 from typer.testing import CliRunner
 
-from compd.cli.live import driver as driver_cli
+from compd.cli.live.gauge import driver as driver_cli
 from compd.plugins import GAUGES, load, names
 from tests.support.paths import ROOT
 
@@ -59,7 +59,7 @@ def test_installed_it_is_found_and_passes(tmp_path: Path, monkeypatch: pytest.Mo
     )
     monkeypatch.syspath_prepend(tmp_path)
     assert "my_gauge" in names(GAUGES)
-    result = CliRunner().invoke(driver_cli.driver, ["test", "my_gauge", "--quick"])
+    result = CliRunner().invoke(driver_cli.driver, ["my_gauge", "--quick"])
     assert result.exit_code == 0, result.output
     assert "nothing failed" in result.output
     for name in [module for module in sys.modules if module.startswith("my_gauge")]:
@@ -70,7 +70,7 @@ def test_by_path_without_any_package(tmp_path: Path) -> None:
     for name in ("driver", "simulated"):
         shutil.copy(TEMPLATE / "my_gauge" / f"{name}.py", tmp_path / f"{name}.py")
         (tmp_path / f"{name}.py").chmod(0o644)
-    arguments = ["test", f"{tmp_path}/driver.py:MyGauge", "--simulator", f"{tmp_path}/simulated.py:SimulatedMyGauge"]
+    arguments = [f"{tmp_path}/driver.py:MyGauge", "--simulator", f"{tmp_path}/simulated.py:SimulatedMyGauge"]
     result = CliRunner().invoke(driver_cli.driver, [*arguments, "--quick"])
     assert result.exit_code == 0, result.output
 

@@ -104,7 +104,7 @@ def static_pages(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
         "compare": ("compare", monday),
         "diagnose": ("diagnose", monday),
         "calibrate": ("calibrate", poses, "--machine", machine),
-        "effect": ("effect", "show", "link_elasticity"),
+        "effect": ("model", "effect", "link_elasticity"),
         "fleet": ("fleet", "report", monday, "--out", directory / "fleet.parquet"),
     }
     pages = {name: directory / f"{name}.html" for name in commands}

@@ -6,7 +6,7 @@ from typing import Annotated, Any
 
 import typer
 
-from compd.cli.options import DEFAULT_SOCKET, DaemonOption, unix_address
+from compd.cli.options import DEFAULT_SOCKET, DaemonOption, daemon_address
 
 _TIMEOUT_S = 15.0
 
@@ -25,7 +25,7 @@ def accept(
     from compd.client import connect
 
     failed = False
-    with connect(unix_address(daemon), _TIMEOUT_S) as client:
+    with connect(daemon_address(daemon), _TIMEOUT_S) as client:
         for gauge in gauges or ():
             answer = client.accept(gauge)
             for channel, for_s in answer.get("believed_for_s", {}).items():

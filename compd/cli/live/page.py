@@ -10,18 +10,14 @@ from urllib.parse import quote, urlsplit
 
 import typer
 
-from compd.cli.options import DEFAULT_SOCKET
+from compd.cli.options import DEFAULT_SOCKET, DaemonOption, daemon_address
 from compd.cli.paths import PathKind
 
 _TLS = "put a proxy with TLS in front (--behind): tokens pass in the clear otherwise"
 
 
 def page(
-    address: Annotated[
-        str,
-        typer.Argument(metavar="CONFIG", help="The daemon's configuration (YAML), or its Unix socket."),
-        PathKind.NAME_OR_FILE,
-    ] = DEFAULT_SOCKET,
+    daemon: DaemonOption = DEFAULT_SOCKET,
     port: Annotated[int, typer.Option(min=0, max=65535, help="TCP port of the page; 0: any free port.")] = 7760,
     listen: Annotated[
         str | None,
@@ -50,7 +46,9 @@ def page(
     ),
     models: Annotated[
         Path | None,
-        typer.Option(help="The directory of model files to choose from; default: that of CONFIG."),
+        typer.Option(
+            help="The directory of model files to choose from; default: that of the configuration that --daemon names."
+        ),
         PathKind.FOLDER,
     ] = None,
 ) -> None:
@@ -59,7 +57,6 @@ def page(
     It runs until Ctrl-C, beside the daemon, and prints the address to open. On a terminal an address for other devices
     is drawn as a QR code too.
     """
-    from compd.cli.options import unix_address
     from compd.log import hide_secrets_of_libraries, is_journal, log_to_stderr
     from compd.page import Token, add_token, hashed, origin, read_tokens, run_page
     from compd.page import new_token as make_token
@@ -74,7 +71,7 @@ def page(
     alone = listen is None and behind is None
     if alone:
         if tokens is not None:
-            raise typer.BadParameter(_without_listen(address, tokens))
+            raise typer.BadParameter(_without_listen(daemon, tokens))
         known = [Token("this computer", "view" if read_only else "operate", hashed(own))]
     else:
         known = [
@@ -98,8 +95,10 @@ def page(
         if listen is not None and behind is None:
             typer.echo(_TLS, err=True)
 
-    unix_socket = unix_address(address)
-    machine = Path(address) if unix_socket != address else None
+    unix_socket = daemon_address(daemon)
+    if "/" not in unix_socket:
+        raise typer.BadParameter(f"{daemon}: the page runs on the daemon's computer, at its Unix socket")
+    machine = Path(daemon) if daemon.endswith((".yaml", ".yml")) else None
     if models is None and machine is not None:
         models = machine.parent
     offered = None if models is None else models.absolute()
@@ -107,8 +106,8 @@ def page(
     run_page(unix_socket, recordings.absolute(), host, port, known, started, offered, _origin(behind), machine)
 
 
-def _without_listen(address: str, tokens: Path) -> str:
-    words = ["compd", "page", *([] if address == DEFAULT_SOCKET else [address])]
+def _without_listen(daemon: str, tokens: Path) -> str:
+    words = ["compd", "page", *([] if daemon == DEFAULT_SOCKET else ["--daemon", daemon])]
     line = shlex.join([*words, "--listen", "127.0.0.1", "--tokens", str(tokens)])
     return (
         f"--tokens {tokens} has no effect without --listen or --behind; type: {line} "

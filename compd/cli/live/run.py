@@ -17,7 +17,7 @@ from compd.live.system import exhaustion_named, require_descriptors, require_lim
 def run(config: Annotated[Path, typer.Argument(help="The machine's configuration (YAML).")]) -> None:
     """Run the daemon: read the gauges, compute, publish, until SIGTERM or Ctrl-C.
 
-    A configuration that is not there yet is waited for, for half a minute: `compd simulate` may be about to write it.
+    A configuration that is not there yet is waited for, for half a minute: `compd sim run` may be about to write it.
     """
     require_limits()
     with exhaustion_named():

@@ -7,16 +7,11 @@ from typing import Annotated
 
 import typer
 
-from compd.cli.options import DEFAULT_SOCKET, unix_address
-from compd.cli.paths import PathKind
+from compd.cli.options import DEFAULT_SOCKET, DaemonOption, daemon_address
 
 
 def status(
-    address: Annotated[
-        str,
-        typer.Argument(help="The daemon's host:port or Unix socket, or the configuration (YAML) that names it."),
-        PathKind.NAME_OR_FILE,
-    ] = DEFAULT_SOCKET,
+    daemon: DaemonOption = DEFAULT_SOCKET,
     timeout_s: Annotated[float, typer.Option("--timeout", min=0.1, help="Wait (s) for an answer.")] = 5.0,
     as_json: Annotated[bool, typer.Option("--json", help="Print the same and all of STATUS as JSON.")] = False,
 ) -> None:
@@ -29,9 +24,9 @@ def status(
     from compd.errors import CompdError
 
     try:
-        found = daemon_status(unix_address(address), timeout_s)
+        found = daemon_status(daemon_address(daemon), timeout_s)
     except CompdError as error:
-        found = DaemonStatus(Health.UNKNOWN, address, "", str(error.problems[0]).replace("\n", " "))
+        found = DaemonStatus(Health.UNKNOWN, daemon, "", str(error.problems[0]).replace("\n", " "))
     if as_json:
         typer.echo(json.dumps(found.to_json()))
     else:

@@ -15,9 +15,9 @@ from rich.live import Live
 from rich.table import Table
 from rich.text import Text
 
-from compd.cli.paths import PathKind
+from compd.cli.options import DEFAULT_SOCKET, DaemonOption
 from compd.cli.waiting import connect_patiently
-from compd.client import DEFAULT_ADDRESS, Client, connect
+from compd.client import Client, connect
 from compd.clock import Clock, MonotonicClock
 from compd.commissioning import warnings_of
 from compd.errors import CompdError
@@ -39,11 +39,7 @@ _END_WITHIN_S = 0.5
 
 
 def watch(
-    address: Annotated[
-        str,
-        typer.Argument(help="The daemon's host:port or Unix socket, or the configuration (YAML) that names one."),
-        PathKind.NAME_OR_FILE,
-    ] = DEFAULT_ADDRESS,
+    daemon: DaemonOption = DEFAULT_SOCKET,
     rate_hz: Annotated[float, typer.Option(min=0.1, help="Setpoints per second.")] = 10.0,
     count: Annotated[int, typer.Option(min=0, help="Stop after this many setpoints; 0 = until Ctrl-C.")] = 0,
     json_lines: Annotated[bool, typer.Option("--json", help="Print the received messages, one per line.")] = False,
@@ -53,12 +49,12 @@ def watch(
 ) -> None:
     """Watch the daemon: tip, corrections with their sources, state and reason, ages, loop."""
     token = None if token_file is None else token_file.read_text(encoding="utf-8")
-    with connect_patiently(address, lambda path: connect(path, token=token)) as client:
+    with connect_patiently(daemon, lambda path: connect(path, token=token)) as client:
         try:
             if json_lines:
                 _print_lines(client, rate_hz, count)
             else:
-                _show(client, rate_hz, count, same_clock="/" in address)
+                _show(client, rate_hz, count, same_clock=":" not in daemon)
         except KeyboardInterrupt:
             return
 

@@ -7,8 +7,7 @@ from typing import Annotated
 
 import typer
 
-from compd.cli.options import DEFAULT_SOCKET
-from compd.cli.paths import PathKind
+from compd.cli.options import DEFAULT_SOCKET, DaemonOption
 from compd.units import UM_PER_MM
 
 # Timeout (s) of the answer: the daemon averages the gauges for a second, and a slow disk takes time.
@@ -18,11 +17,7 @@ _SHOWN = 9
 
 
 def zero(
-    address: Annotated[
-        str,
-        typer.Argument(help="The daemon's Unix socket, or the configuration (YAML) that names it."),
-        PathKind.NAME_OR_FILE,
-    ] = DEFAULT_SOCKET,
+    daemon: DaemonOption = DEFAULT_SOCKET,
     yes: Annotated[
         bool, typer.Option("--yes", help="Do not ask about gauges that are distrusted or far from the previous zero.")
     ] = False,
@@ -35,7 +30,7 @@ def zero(
     from compd.client import connect
     from compd.errors import DaemonError
 
-    with connect_patiently(address, lambda path: connect(path, _TIMEOUT_S)) as client:
+    with connect_patiently(daemon, lambda path: connect(path, _TIMEOUT_S)) as client:
         wait_for_gauges(client)
         try:
             answer = client.zero(replace=yes)

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from compd.cli.options import HoldOption, MachineOption, OverwriteOption, RangesOption
+from compd.cli.option_groups import PageOptions, with_groups
+from compd.cli.options import HoldOption, JsonOption, MachineOption, RangesOption
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
     from compd.comparison import AlignedRecording
 
 
+@with_groups
 def calibrate(
     recordings: Annotated[
         list[Path],
@@ -46,9 +48,8 @@ def calibrate(
             "what no drawing states, such as gains.",
         ),
     ] = None,
-    html: Annotated[Path | None, typer.Option("--html", help="Page (HTML) to write.")] = None,
-    overwrite: OverwriteOption = False,
-    as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON, for programs.")] = False,
+    page: PageOptions = PageOptions(),
+    as_json: JsonOption = False,
 ) -> None:
     """Learn how the machine is built: joints, lengths, zeros, gains, from its drawing and measured poses.
 
@@ -61,10 +62,7 @@ def calibrate(
     from compd.cli.progress import steps_shown
     from compd.comparison import open_recording
 
-    if html is not None:
-        from compd.report import check_page_path
-
-        check_page_path(html, overwrite)
+    page.check()
     if out is not None:
         from compd.built_machine import BUILT_MARK
         from compd.files import check_directory, check_replaceable
@@ -72,7 +70,7 @@ def calibrate(
         if out.suffix not in (".yaml", ".yml"):
             raise typer.BadParameter(f"{out} is no configuration: NAME.yaml", param_hint="--out")
         check_directory(out)
-        check_replaceable(out, (BUILT_MARK,), "a machine as built", overwrite)
+        check_replaceable(out, (BUILT_MARK,), "a machine as built", page.overwrite)
 
     def opened(path: Path, stated: list[str] | None = None) -> AlignedRecording:
         return open_recording(path, machine, ranges=stated or (), hold=hold or ())
@@ -87,10 +85,10 @@ def calibrate(
         from compd.api import write_built_machine
 
         built = write_built_machine(calibration, learned, out, machine)
-    if html is not None:
+    if page.html is not None:
         from compd.report import write_calibration_page
 
-        write_calibration_page(html, calibration, "" if out is None else str(out))
+        write_calibration_page(page.html, calibration, "" if out is None else str(out))
     if as_json:
         data = {**calibration.as_json(), **({} if checked is None else {"check": checked.as_json()})}
         typer.echo(json.dumps(data, indent=1, allow_nan=False))

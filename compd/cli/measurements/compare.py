@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from compd.cli.options import HoldOption, MachineOption, OverwriteOption
+from compd.cli.option_groups import PageOptions, with_groups
+from compd.cli.options import HoldOption, JsonOption, MachineOption
 
 if TYPE_CHECKING:
     from compd.comparison import Comparison
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
 MAX_SENTENCES = 6
 
 
+@with_groups
 def compare(
     recordings: Annotated[
         list[Path],
@@ -30,11 +32,8 @@ def compare(
         Path | None, typer.Option("--model", help="The model file with fitted effects; default: no effects.")
     ] = None,
     hold: HoldOption = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON, for programs.")] = False,
-    html: Annotated[
-        Path | None, typer.Option("--html", help="Write the page with the pictures; works offline.")
-    ] = None,
-    overwrite: OverwriteOption = False,
+    as_json: JsonOption = False,
+    page: PageOptions = PageOptions(),
 ) -> None:
     """Compare the model with recordings: print residuals, noise floor, contributions and the worst regions.
 
@@ -45,10 +44,7 @@ def compare(
     from compd.cli.progress import open_shown
     from compd.errors import CompdError, Problem
 
-    if html is not None:
-        from compd.report import check_page_path
-
-        check_page_path(html, overwrite)
+    page.check()
     problems: list[Problem] = []
     comparisons: list[Comparison] = []
     for path in recordings:
@@ -58,17 +54,17 @@ def compare(
             problems += error.problems
     if problems:
         raise CompdError(list(dict.fromkeys(problems)))
-    if html is not None:
+    if page.html is not None:
         from compd.report import write_comparison_page
 
-        write_comparison_page(html, comparisons)
+        write_comparison_page(page.html, comparisons)
     if as_json:
         results = [comparison.as_json() for comparison in comparisons]
         typer.echo(json.dumps(results[0] if len(results) == 1 else {"recordings": results}, indent=1, allow_nan=False))
         return
     print_comparisons(comparisons)
-    if html is not None:
-        typer.echo(f"The same as pictures: {html}")
+    if page.html is not None:
+        typer.echo(f"The same as pictures: {page.html}")
 
 
 def print_comparisons(comparisons: list[Comparison]) -> None:

@@ -8,9 +8,11 @@ from typing import Annotated, Any
 
 import typer
 
-from compd.cli.options import EffectsOption, HoldOption, MachineOption, OverwriteOption, RangesOption
+from compd.cli.option_groups import PageOptions, with_groups
+from compd.cli.options import EffectsOption, HoldOption, JsonOption, MachineOption, RangesOption
 
 
+@with_groups
 def diagnose(
     recordings: Annotated[
         list[Path],
@@ -27,9 +29,8 @@ def diagnose(
     effects: EffectsOption = None,
     ranges: RangesOption = None,
     hold: HoldOption = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON, for programs.")] = False,
-    html: Annotated[Path | None, typer.Option("--html", help="Write the page with pictures; works offline.")] = None,
-    overwrite: OverwriteOption = False,
+    as_json: JsonOption = False,
+    page: PageOptions = PageOptions(),
 ) -> None:
     """Find the missing physical effect: twelve lines with the verdict and the next step, then the evidence.
 
@@ -42,19 +43,16 @@ def diagnose(
     from compd.diagnosis import evaluate_holdouts
     from compd.report import print_diagnosis
 
-    if html is not None:
-        from compd.report import check_page_path
-
-        check_page_path(html, overwrite)
+    page.check()
     sealed = [open_shown(path, machine, hold=hold or ()) for path in recordings[1:]]
     aligned = open_shown(recordings[0], machine, ranges or (), hold or ())
     with steps_shown(quiet=as_json) as progress:
         diagnosis = diagnose_recording(aligned, model, effects=effects or (), progress=progress)
     diagnosis, holdouts = evaluate_holdouts(diagnosis, sealed)
-    if html is not None:
+    if page.html is not None:
         from compd.report import write_diagnosis_page
 
-        write_diagnosis_page(html, diagnosis, holdouts)
+        write_diagnosis_page(page.html, diagnosis, holdouts)
     if as_json:
         data: dict[str, Any] = {**diagnosis.as_json(), "sealed": [holdout.as_json() for holdout in holdouts]}
         if "sample" in (compared := diagnosis.before.as_json()):
@@ -62,5 +60,5 @@ def diagnose(
         typer.echo(json.dumps(data, indent=1, allow_nan=False))
         return
     print_diagnosis(Console(highlight=False), diagnosis, holdouts)
-    if html is not None:
-        typer.echo(f"The same as pictures: {html}")
+    if page.html is not None:
+        typer.echo(f"The same as pictures: {page.html}")

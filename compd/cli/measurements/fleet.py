@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal, NamedTuple
 
 import typer
 
-from compd.cli.options import EffectsOption, OverwriteOption
+from compd.cli.option_groups import PageOptions, with_groups
+from compd.cli.options import EffectsOption
 from compd.cli.paths import PathKind
 from compd.fleet import MachinesBy
 
 if TYPE_CHECKING:
-    from compd.fleet import Examination, RecordingResult
+    from compd.fleet import RecordingResult
 
 # Most sentences of a kind in the terminal; the page and the table have all.
 MAX_SENTENCES = 20
@@ -34,109 +35,82 @@ PlacesArgument = Annotated[
     ),
     PathKind.ANY,
 ]
-MachinesOption = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--machine",
-        metavar="FILE",
-        help="The configuration of a machine outside compd's, for the recordings that name it; or a "
-        "pattern of several ('machines/*.yaml'). May be repeated.",
-    ),
-    PathKind.ANY,
-]
-ModelsOption = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--model",
-        metavar="FILE",
-        help="A model file, for the recordings of its machine; or a pattern: 'models/{machine}.yaml' where machines "
-        "that are built alike have a model each. May be repeated.",
-    ),
-    PathKind.ANY,
-]
-MachinesByOption = Annotated[
-    MachinesBy,
-    typer.Option(
-        "--machines-by",
-        help="Distinction of machines with one configuration: by directory, or none (sidecar); auto prints its choice.",
-    ),
-]
-FreshOption = Annotated[
-    bool, typer.Option("--fresh", help="Examine every recording again, including those with a result in the table.")
-]
-SchedulerOption = Annotated[
-    str | None,
-    typer.Option(
-        "--scheduler",
-        metavar="tcp://HOST:PORT",
-        help="A running Dask scheduler; default: all cores of this computer.",
-    ),
-]
-OutOption = Annotated[
-    Path,
-    typer.Option(
-        "--out",
-        help="The table to write (Parquet). Earlier results of the same files, model and options are kept.",
-    ),
-]
-HtmlOption = Annotated[Path | None, typer.Option("--html", help="Write the page too; works offline.")]
 
 
-@fleet.callback()
-def _fleet() -> None:
-    """Examine the recordings of many machines, on all cores or on a Dask cluster."""
+class ExaminationOptions(NamedTuple):
+    """Options of every examination of recordings."""
+
+    out: Annotated[
+        Path,
+        typer.Option(
+            help="The table to write (Parquet). Earlier results of the same files, model and options are kept.",
+        ),
+    ] = Path("fleet.parquet")
+    machine: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="FILE",
+            help="The configuration of a machine outside compd's, for the recordings that name it; or a "
+            "pattern of several ('machines/*.yaml'). May be repeated.",
+        ),
+        PathKind.ANY,
+    ] = None
+    model: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="FILE",
+            help="A model file, for the recordings of its machine; or a pattern: 'models/{machine}.yaml' where "
+            "machines that are built alike have a model each. May be repeated.",
+        ),
+        PathKind.ANY,
+    ] = None
+    machines_by: Annotated[
+        MachinesBy,
+        typer.Option(
+            help="Distinction of machines with one configuration: by directory, or none (sidecar); auto prints its "
+            "choice.",
+        ),
+    ] = MachinesBy.auto
+    scheduler: Annotated[
+        str | None,
+        typer.Option(metavar="tcp://HOST:PORT", help="A running Dask scheduler; default: all cores of this computer."),
+    ] = None
+    fresh: Annotated[
+        bool, typer.Option("--fresh", help="Examine every recording again, including those with a result in the table.")
+    ] = False
 
 
 @fleet.command()
+@with_groups
 def compare(
-    places: PlacesArgument,
-    out: OutOption = Path("fleet.parquet"),
-    machine: MachinesOption = None,
-    model: ModelsOption = None,
-    machines_by: MachinesByOption = MachinesBy.auto,
-    scheduler: SchedulerOption = None,
-    fresh: FreshOption = False,
-    html: HtmlOption = None,
-    overwrite: OverwriteOption = False,
+    places: PlacesArgument, options: ExaminationOptions = ExaminationOptions(), page: PageOptions = PageOptions()
 ) -> None:
     """Compare every recording with the model of its machine, refitting the model's effects on each.
 
     A recording that cannot be examined is a row with its problem, and the others go on; the exit code is then 1. A run
     that was interrupted goes on where it stopped.
     """
-    from compd.fleet import check_installed, examination
-
-    check_installed()
-    wanted = examination("compare", machine or (), model or ())
-    _examine(wanted, places, machines_by, out, scheduler, html, fresh, overwrite)
+    _examine("compare", places, options, page)
 
 
 @fleet.command()
+@with_groups
 def diagnose(
     places: PlacesArgument,
-    out: OutOption = Path("fleet.parquet"),
-    machine: MachinesOption = None,
-    model: ModelsOption = None,
+    options: ExaminationOptions = ExaminationOptions(),
     effects: EffectsOption = None,
-    machines_by: MachinesByOption = MachinesBy.auto,
-    scheduler: SchedulerOption = None,
-    fresh: FreshOption = False,
-    html: HtmlOption = None,
-    overwrite: OverwriteOption = False,
+    page: PageOptions = PageOptions(),
 ) -> None:
     """Diagnose every recording: find the effect that the model of its machine lacks, with its numbers.
 
     A recording that cannot be examined is a row with its problem, and the others go on; the exit code is then 1. A run
     that was interrupted goes on where it stopped.
     """
-    from compd.fleet import check_installed, examination
-
-    check_installed()
-    wanted = examination("diagnose", machine or (), model or (), effects or ())
-    _examine(wanted, places, machines_by, out, scheduler, html, fresh, overwrite)
+    _examine("diagnose", places, options, page, effects)
 
 
 @fleet.command()
+@with_groups
 def report(
     places: Annotated[
         list[str],
@@ -147,65 +121,58 @@ def report(
         ),
         PathKind.ANY,
     ],
-    html: Annotated[Path, typer.Option("--html", help="The page to write; works offline.")] = Path("fleet.html"),
-    out: OutOption = Path("fleet.parquet"),
-    machine: MachinesOption = None,
-    model: ModelsOption = None,
+    page: PageOptions = PageOptions(Path("fleet.html")),
+    options: ExaminationOptions = ExaminationOptions(),
     effects: EffectsOption = None,
-    machines_by: MachinesByOption = MachinesBy.auto,
-    scheduler: SchedulerOption = None,
-    fresh: FreshOption = False,
-    overwrite: OverwriteOption = False,
 ) -> None:
     """Write the page: effects by machine, drifts, differing machines, unreadable recordings."""
     from compd.fleet import check_installed
 
     check_installed()
-    from compd.fleet import examination, is_table, read_table, write_fleet_page
-    from compd.report import check_page_path
+    from compd.fleet import is_table, read_table, write_fleet_page
 
     if not all(is_table(Path(place)) for place in places):
-        wanted = examination("diagnose", machine or (), model or (), effects or ())
-        _examine(wanted, places, machines_by, out, scheduler, html, fresh, overwrite)
+        _examine("diagnose", places, options, page, effects)
         return
-    check_page_path(html, overwrite)
+    page.check()
     results = [result for place in places for result in read_table(Path(place))]
-    write_fleet_page(html, results)
+    assert page.html is not None
+    write_fleet_page(page.html, results)
     _print_overview(results)
-    typer.echo(f"The page: {html}")
+    typer.echo(f"The page: {page.html}")
 
 
 def _examine(
-    wanted: Examination,
+    command: Literal["compare", "diagnose"],
     places: list[str],
-    by: MachinesBy,
-    out: Path,
-    scheduler: str | None,
-    html: Path | None,
-    fresh: bool,
-    overwrite: bool,
+    options: ExaminationOptions,
+    page: PageOptions,
+    effects: list[str] | None = None,
 ) -> None:
     """Examine the recordings in these places, write the table and optionally the page, print an overview."""
+    from compd.fleet import check_installed
+
+    check_installed()
     from compd.cli.problems import print_problems
     from compd.cli.progress import count_shown
     from compd.fleet import (
         Checkpoint,
         check_table_path,
         earlier_results,
+        examination,
         examine_fleet,
         find_recordings,
         write_fleet_page,
         write_table,
     )
 
-    check_table_path(out, wanted.command, overwrite)
-    if html is not None:
-        from compd.report import check_page_path
-
-        check_page_path(html, overwrite)
-    found = find_recordings(places, by)
+    wanted = examination(command, options.machine or (), options.model or (), effects or ())
+    out = options.out
+    check_table_path(out, command, page.overwrite)
+    page.check()
+    found = find_recordings(places, options.machines_by)
     print_problems(found.remarks, "remark: ")
-    earlier = () if fresh else earlier_results(out)
+    earlier = () if options.fresh else earlier_results(out)
     checkpoint = Checkpoint(out)
     with count_shown(len(found.recordings), "recordings") as done:
 
@@ -213,15 +180,15 @@ def _examine(
             checkpoint.add(result)
             done(checkpoint.count)
 
-        run = examine_fleet(wanted, found.recordings, scheduler, progress, earlier)
+        run = examine_fleet(wanted, found.recordings, options.scheduler, progress, earlier)
     write_table(out, run.results)
     if run.kept:
         typer.echo(f"{run.kept} of {len(run.results)} were in {out} already, of the same files, models and options.")
     _print_overview(run.results)
     typer.echo(f"The table: {out}")
-    if html is not None:
-        write_fleet_page(html, run.results)
-        typer.echo(f"The page: {html}")
+    if page.html is not None:
+        write_fleet_page(page.html, run.results)
+        typer.echo(f"The page: {page.html}")
     if run.interrupted:
         typer.echo("Interrupted; the same command goes on where it stopped.")
         raise typer.Exit(_INTERRUPTED)

@@ -81,7 +81,7 @@ def plan(
         PlanShape,
         typer.Option(
             "--as",
-            help="plan (CSV for `compd simulate --plan`); targets for the instrument: sa (SpatialAnalyzer), csv; gcode "
+            help="plan (CSV for `compd sim run --plan`); targets for the instrument: sa (SpatialAnalyzer), csv; gcode "
             "for the controller.",
         ),
     ] = PlanShape.plan,

@@ -20,7 +20,6 @@ if TYPE_CHECKING:
 def check(
     config: Annotated[Path | None, typer.Argument(help="The machine's configuration (YAML).")] = None,
     schema: Annotated[bool, typer.Option("--schema", help="Print the JSON Schema for editors and stop.")] = False,
-    drivers: Annotated[bool, typer.Option("--drivers", help="List the installed gauge drivers and stop.")] = False,
     what_cannot_be_seen: Annotated[
         bool,
         typer.Option("--what-cannot-be-seen", help="Print the undetected faults of the gauges, and their cost."),
@@ -35,9 +34,6 @@ def check(
         from compd.configuration import json_schema
 
         typer.echo(json.dumps(json_schema(), indent=2))
-        return
-    if drivers:
-        _list_drivers()
         return
     if config is None:
         raise typer.BadParameter("name a configuration file, e.g. config/tripod-cmm.yaml")
@@ -189,20 +185,6 @@ def token_warnings(configuration: Configuration) -> list[Problem]:
     except DaemonError as error:
         return list(error.problems)
     return []
-
-
-def _list_drivers() -> None:
-    from rich.console import Console
-    from rich.table import Table
-
-    from compd.plugins import GAUGES, load, names
-
-    table = Table("driver", "needs a line that carries", "what it is")
-    table.columns[0].no_wrap = True
-    for name in names(GAUGES):
-        driver = load(GAUGES, name, name)
-        table.add_row(name, driver.line_kind, (driver.__doc__ or "").strip().splitlines()[0])
-    Console().print(table)
 
 
 def _print_budgets(budgets: Sequence[LineBudget]) -> None:

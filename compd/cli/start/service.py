@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from compd.cli.options import DEFAULT_SOCKET, DaemonOption, unix_address
+from compd.cli.options import DEFAULT_SOCKET, DaemonOption, daemon_address
 
 if TYPE_CHECKING:
     from compd.installation import Replacement
@@ -68,7 +68,7 @@ def upgrade(daemon: DaemonOption = DEFAULT_SOCKET) -> None:
     before = (
         "The version before: install its package" if is_packaged(program) else "compd service back: the release before"
     )
-    _report(upgrade_to(unix_address(daemon), program), before)
+    _report(upgrade_to(daemon_address(daemon), program), before)
 
 
 @service.command()
@@ -77,7 +77,7 @@ def back(daemon: DaemonOption = DEFAULT_SOCKET) -> None:
     from compd.installation import go_back
 
     _require_root()
-    _report(go_back(unix_address(daemon)), "compd service back: the release after")
+    _report(go_back(daemon_address(daemon)), "compd service back: the release after")
 
 
 def _report(came: Replacement, other: str) -> None:

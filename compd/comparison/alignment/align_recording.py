@@ -76,7 +76,7 @@ def recorded_observations(
     """
     if recording.reference is None:
         where = str(recording.path)
-        raise RecordingError.of(where, "names no reference", next_step="add one with `compd join`")
+        raise RecordingError.of(where, "names no reference", next_step="add one with `compd recording join`")
     starts = session_starts(recording)
     if model is None:
         return external_observations(recording, starts, criteria.speeds)

@@ -136,7 +136,7 @@ class EmpiricalTerm:
     def declaration(
         self, axis: str, value: float | None = None, sizes: Mapping[str, float] | None = None
     ) -> dict[str, Any]:
-        """The term as the declaration of a formula effect, as `compd effect add` reads it.
+        """The term as the declaration of a formula effect, as `compd model add` reads it.
 
         value : of the nonlinear constant, to be written into the formula; None leaves it a parameter.
         sizes : largest fitted size by parameter; the plausible range is RANGE_PER_SIZE times that.

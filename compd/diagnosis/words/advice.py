@@ -74,7 +74,7 @@ def _how_to_add(diagnosis: Diagnosis, on_page: bool) -> list[str]:
     if on_page:
         return [*first, "add it: Add … below", "try it on another day's recording: open that with this model"]
     more = f", then {join_words(ids[1:])}" if len(ids) > 1 else ""
-    add = f"add it: compd effect add {ids[0]} --recording {recording} --model FILE{more}"
+    add = f"add it: compd model add {ids[0]} --recording {recording} --model FILE{more}"
     return [*first, add, "try it on another day's recording: compd compare OTHER.csv --model FILE"]
 
 
@@ -85,7 +85,7 @@ def _what_may_be_added(diagnosis: Diagnosis, on_page: bool) -> list[str]:
         return [f"do not add {join_words(doubtful)}: something else looks like it"]
     if any(step.rivals for step in diagnosis.steps):
         return []
-    how = "Add … below" if on_page else "compd effect add"
+    how = "Add … below" if on_page else "compd model add"
     return [f"what was found may be added ({how}): it lowers the error, the rest stays"]
 
 

@@ -51,7 +51,7 @@ from compd.setpoint_states import Mode, State
 NO_SCALES = "there are no scales: what a TARGET commands is corrected, and there is none"
 TARGET_TOO_OLD = (
     "the controller's target is too old (sockets.target.valid_for_s): it sends one again, or its role ends by "
-    "`compd release`"
+    "`compd machine release`"
 )
 
 

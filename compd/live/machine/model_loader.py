@@ -295,7 +295,7 @@ def _id_and_value_problems(effects: tuple[FittedEffect, ...]) -> list[Problem]:
         Problem(
             f"effect {fitted.effect.id}",
             "has a parameter or constant that is not a finite number",
-            next_step="fit it again with `compd effect fit`",
+            next_step="fit it again with `compd model fit`",
         )
         for fitted in effects
         if not np.isfinite([*fitted.theta, *fitted.constants.values()]).all()
@@ -312,7 +312,7 @@ def _implausible_numbers(file: ModelFile) -> list[Problem]:
             "is not plausible",
             value=f"{number.value:g} {number.unit}, standard error {number.standard_error:g}",
             allowed=f"{number.plausible_low:g} to {number.plausible_high:g} {number.unit}, with a smaller error",
-            next_step="fit it again with `compd effect fit`; where it is meant, write the range under the effect: "
+            next_step="fit it again with `compd model fit`; where it is meant, write the range under the effect: "
             f"`plausible: {{{number.parameter}: [LOW, HIGH]}}`, and remove the line `checksum`",
         )
         for number in numbers
@@ -329,7 +329,7 @@ def _implausible_ranges(file: ModelFile) -> list[Problem]:
             "was not plausible in the recording that the effects were fitted on",
             value=f"{file.fitted_range[name][0]:g} to {file.fitted_range[name][1]:g}",
             allowed=f"{limit.low:g} to {limit.high:g}: {limit.why}",
-            next_step="leave these rows out of the recording, and fit it again with `compd effect fit`",
+            next_step="leave these rows out of the recording, and fit it again with `compd model fit`",
         )
         for name, limit in limits.items()
         if not limit.low <= file.fitted_range[name][0] <= file.fitted_range[name][1] <= limit.high

@@ -13,7 +13,7 @@ SAME_BY_ANOTHER_KERNEL_MM = 1e-12
 
 
 class Agreement(StrEnum):
-    """One of three. Each value is what `compd replay` says of it."""
+    """One of three. Each value is what `compd recording replay` says of it."""
 
     SAME = "the same to the last bit"
     ANOTHER_KERNEL = "within 1e-12 mm by another kernel"

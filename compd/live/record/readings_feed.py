@@ -124,5 +124,7 @@ class ReadingsFeed:
             break
         self._report(f"the daemon is back: nothing was recorded for {self._clock.monotonic() - gone_s:.1f} s")
         if self.first_messages[0]["config_hash"] != config_hash:
-            self._report("its configuration is another one now: keep both, `compd replay` needs each for its parts")
+            self._report(
+                "its configuration is another one now: keep both, `compd recording replay` needs each for its parts"
+            )
         return True

@@ -9,8 +9,8 @@ A recording is written in parts, NAME-0001, NAME-0002 ..., each complete in itse
     NAME-0001.csv           one row per cycle in the recording format: readings less machine zero; or NAME-0001.parquet,
                             which is NAME-0001.arrow until the part is closed
     NAME-0001.yaml          its sidecar; `provenance` holds machine zero and signs: raw = zero + sign * column
-    NAME-0001.cycles.jsonl  the daemon's messages as they came, byte for byte, for `compd replay`; among them an ORDER
-                            for each order that a client gave, with who gave it
+    NAME-0001.cycles.jsonl  the daemon's messages as they came, byte for byte, for `compd recording replay`; among them
+                            an ORDER for each order that a client gave, with who gave it
     NAME-0001.model-*.yaml  copies of the model files that were applied or ran as the shadow
 
 A new part begins when machine zero is taken anew, since the columns of a part have one zero, and when the daemon has

@@ -160,7 +160,7 @@ class RecordingPart:
         return sidecar_contents(
             version["machine"],
             provenance={
-                "recorded_by": f"compd record {version['release']}",
+                "recorded_by": f"compd {version['release']}",
                 "config_hash": version["config_hash"],
                 "started_at": started_at,
                 "started_at_monotonic_s": self.start_s,

@@ -88,7 +88,7 @@ class RecordedCycles:
             raise RecordingError.of(
                 str(path),
                 "is not there, nor parts of it",
-                allowed=f"a recording by `compd record` (NAME-0001{CYCLES_SUFFIX} beside NAME-0001.csv)",
+                allowed=f"a recording by `compd recording start` (NAME-0001{CYCLES_SUFFIX} beside NAME-0001.csv)",
                 next_step="give its name",
             )
 

@@ -91,7 +91,7 @@ class ModelSwitch:
             raise ProtocolError(
                 ErrorCode.BAD_MESSAGE,
                 "file is a name, and the daemon opens no file: send an open descriptor of it with the line "
-                "(SCM_RIGHTS, in the same sendmsg), as `compd adopt FILE` and compd.client do",
+                "(SCM_RIGHTS, in the same sendmsg), as `compd model adopt FILE` and compd.client do",
             )
         self._begin(wish, answer)
         self._read_until_s = self._clock.monotonic() + READ_WITHIN_S

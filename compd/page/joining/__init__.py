@@ -1,1 +1,1 @@
-"""Joining a measurement in the page: `compd join` with the mouse."""
+"""Joining a measurement in the page: `compd recording join` with the mouse."""

@@ -65,7 +65,7 @@ class Choices:
             "--machine": join.machine,
             "--plan": join.plan,
         }
-        words = ["compd", "join", str(gauges), str(export), str(out)]
+        words = ["compd", "recording", "join", str(gauges), str(export), str(out)]
         for option, value in options.items():
             if value is not None:
                 words += [option, repr(value) if isinstance(value, float) else str(value)]

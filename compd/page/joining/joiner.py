@@ -1,4 +1,4 @@
-"""`compd join` in a worker: parsed exports, and the requests of the join wizard."""
+"""`compd recording join` in a worker: parsed exports, and the requests of the join wizard."""
 
 from __future__ import annotations
 

@@ -89,7 +89,7 @@ def without_machine() -> RecordingError:
         "log",
         "the page knows no machine that the log could be of",
         allowed="the machine's configuration",
-        next_step="start the page with it: compd page MACHINE.yaml",
+        next_step="start the page with it: compd page --daemon MACHINE.yaml",
     )
 
 

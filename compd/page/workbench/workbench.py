@@ -41,12 +41,12 @@ class CommandLines(NamedTuple):
         words = {
             "compare": ["compare", recording, *self._known, *self._machine],
             "diagnose": ["diagnose", recording, *self._known, *_options(effects), *self._machine],
-            "show": ["effect", "show", "EFFECT"],
-            "add": ["effect", "add", "EFFECT", *on],
-            "remove": ["effect", "remove", "EFFECT", *on],
-            "undo": ["effect", "undo", "--model", model],
-            "fit": ["effect", "fit", *on],
-            "ledger": ["ledger", model],
+            "show": ["model", "effect", "EFFECT"],
+            "add": ["model", "add", "EFFECT", *on],
+            "remove": ["model", "remove", "EFFECT", *on],
+            "undo": ["model", "undo", "--model", model],
+            "fit": ["model", "fit", *on],
+            "ledger": ["model", "ledger", model],
             "exclude": ["recording", "exclude", recording, "--rows", "ROWS", "--reason", "REASON"],
             "include": ["recording", "include", recording, "--rows", "ROWS"],
         }

@@ -165,8 +165,8 @@ class World:
     def start_plan(self) -> None:
         """Visit the tour's points once, measure the planned rows, then stand still.
 
-        The walk over the points gives `compd join` the motion by which it aligns two clocks. Raises CompdError if
-        no rows are planned.
+        The walk over the points gives `compd recording join` the motion by which it aligns two clocks. Raises
+        CompdError if no rows are planned.
         """
         if not self._rows:
             raise CompdError.of("simulated machine", "nothing is planned", next_step="start it with --plan")

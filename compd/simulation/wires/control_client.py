@@ -24,7 +24,7 @@ class ControlClient:
             raise DaemonError.of(
                 str(path),
                 f"no simulated machine answers: {error.strerror}",
-                next_step="start it with `compd simulate CONFIG --directory`, and give that directory",
+                next_step="start it with `compd sim run CONFIG --directory`, and give that directory",
             ) from error
         self._lines = self._socket.makefile("rb")
 

@@ -77,7 +77,7 @@ def daemon_configuration(
 
 
 def _write(path: Path, original: Path, data: dict[str, Any]) -> None:
-    head = f"# {original.name} with the ports of a simulated machine; {WRITTEN_BY}\n"
+    head = f"# {original.name} {WRITTEN_BY} run`, gone with it.\n"
     check_replaceable(path, (WRITTEN_BY.encode(),), "a configuration of a simulated machine")
     # whole at once: a daemon may be waiting for it
     write_files({path: head + yaml.safe_dump(data, sort_keys=False, width=110)})

@@ -16,8 +16,8 @@ PORTS = "ports"
 STATE = "state"
 # Files of a simulator and of its daemon, with the copies that a crash leaves.
 _MADE = ((PORTS, "*"), (STATE, "*machine-zero.json*"), (STATE, "*last-readings.json*"))
-# First line of the daemon's configuration: only a file that begins so is replaced and removed.
-WRITTEN_BY = "written by `compd simulate`, gone with it."
+# In the first line of the daemon's configuration, of 0.3 too: only a file that says so is replaced and removed.
+WRITTEN_BY = "with the ports of a simulated machine; written by `compd sim"
 
 
 class SimulationDirectory:
@@ -70,7 +70,7 @@ class SimulationDirectory:
         if self._configuration.exists() and not self._is_ours():
             raise CompdError.of(
                 str(self._configuration),
-                "would be replaced, and was not written by `compd simulate`",
+                "would be replaced, and was not written by `compd sim run`",
                 next_step="give another --directory",
             )
 

@@ -41,7 +41,7 @@ class MyGauge(Gauge[ByteLine]):
     line_kind = "bytes"
     integrity = "format"  # no checksum on this wire
     usual_line = (9600, "8N1")
-    # `compd driver test my_gauge` tries the driver with these
+    # `compd gauge test-driver my_gauge` tries the driver with these
     sample_options: ClassVar[Mapping[str, Any]] = {"unit": "mm"}
 
     def __init__(self, options: MyGaugeOptions) -> None:

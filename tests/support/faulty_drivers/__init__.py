@@ -1,4 +1,4 @@
-"""Drivers that are wrong in one way each, and the devices that they are for; `compd driver test` must find every one.
+"""Drivers that are wrong in one way each, and the devices that they are for; `compd gauge test-driver` must find all.
 
 Of each kind of device there is a driver that is right, too: `device` of a driver is the device that it is for.
 """

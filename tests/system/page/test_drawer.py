@@ -45,7 +45,7 @@ def test_a_model_is_chosen_tried_adopted_and_left(with_models, live, tmp_path):
     tab.locator(".choose button", has_text="two.model.yaml").click()
     assert tab.locator(".choose button[aria-pressed=true]").inner_text() == "two.model.yaml"
     command = confirmed(tab, "shadow", "run as a shadow")
-    assert command == f"compd shadow {tmp_path}/two.model.yaml --daemon {live.socket}"
+    assert command == f"compd model shadow {tmp_path}/two.model.yaml --daemon {live.socket}"
     until(tab, "document.querySelectorAll('#budget .bar .shadow').length === 3")
     until(tab, "document.querySelector('.choose').innerText.includes('● shadow')")
 
@@ -56,7 +56,7 @@ def test_a_model_is_chosen_tried_adopted_and_left(with_models, live, tmp_path):
 
     tab.locator(".choose button", has_text="one.model.yaml").click()  # and nothing is chosen: the shadow's
     command = confirmed(tab, "adopt", "adopt the shadow\\'s model")
-    assert command == f"compd adopt {tmp_path}/two.model.yaml --daemon {live.socket}"
+    assert command == f"compd model adopt {tmp_path}/two.model.yaml --daemon {live.socket}"
     until(tab, "Math.abs(Math.abs(compd.live.setpoint.sources_mm?.link_zero?.[0]) - 0.02) < 1e-6")
     until(tab, "compd.slow.status.model.applied.effects[0] === 'link_zero'")
     confirmed(tab, "no-shadow", "end the shadow")
@@ -116,10 +116,10 @@ def test_the_command_lines_of_orders_and_recordings_are_copied(with_models, live
     tab.locator("#order-zero").click()
     tab.locator(".consequence .command button").click()
     until(tab, "document.querySelector('.consequence .command button').textContent === 'Copied'")
-    assert tab.evaluate("navigator.clipboard.readText()") == f"compd zero {live.socket}"
+    assert tab.evaluate("navigator.clipboard.readText()") == f"compd zero --daemon {live.socket}"
     tab.locator("input[aria-label='Name of the recording']").fill("monday")
     lines = [code.inner_text() for code in tab.locator("#drawer > .command code").all()]
-    record = f"compd record {tmp_path}/recordings/monday --daemon {live.socket}"
+    record = f"compd recording start {tmp_path}/recordings/monday --daemon {live.socket}"
     assert lines == [record, f"{record} --burst 5"]
 
 

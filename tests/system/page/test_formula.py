@@ -103,7 +103,7 @@ def test_it_is_kept_there_after_opening_anew_and_added_as_the_command_adds_it(op
     second.locator(".effect[data-effect=growth]").click()
     until(second, "bench.trial")
     command = second.locator("#card .command code").inner_text()
-    assert command.startswith(f"compd effect add {file}:growth --recording")
+    assert command.startswith(f"compd model add {file}:growth --recording")
     second.locator("#add").click()
     second.wait_for_selector("#confirm")
     second.locator("#confirm").click()

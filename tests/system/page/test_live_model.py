@@ -90,7 +90,7 @@ def test_an_effect_is_added_run_as_a_shadow_and_adopted_by_mouse(chromium, live,
         assert now < 0.2 * before
         until(tab, f"document.querySelector('.error-bar b').textContent === '{before:.2f} → {now:.2f} µm'")
 
-        assert order(tab, "live-shadow") == f"compd shadow {model} --daemon {live.socket}"
+        assert order(tab, "live-shadow") == f"compd model shadow {model} --daemon {live.socket}"
         tab.locator("#confirm-order").click()
         assert order_answer(tab) == "Arm the page first."
         refused = tab.evaluate(
@@ -126,7 +126,7 @@ def test_an_effect_is_added_run_as_a_shadow_and_adopted_by_mouse(chromium, live,
         assert numbers(tab)[1] == "0.00 µm", "nothing is left for this model to take out"
         tab.locator("#live-model").screenshot(path=str(tmp_path / "adopted.png"))
 
-        assert order(tab, "live-no-model") == f"compd adopt --none --daemon {live.socket}"
+        assert order(tab, "live-no-model") == f"compd model adopt --none --daemon {live.socket}"
         tab.locator("#confirm-order").click()
         until(tab, "document.querySelector('#live-model .order-answer').textContent === 'Done: run without effects.'")
         assert daemon.model()["applied"]["effects"] == []
@@ -159,7 +159,7 @@ def test_who_may_look_only_sees_numbers_and_command_lines_and_gives_no_order(chr
         assert tab.locator("#arm").is_disabled()
         tab.locator("#live-no-model").click()
         until(tab, "document.querySelector('#confirm-order')")
-        assert "compd adopt --none" in tab.locator("#live-model .consequence code").inner_text()
+        assert "compd model adopt --none" in tab.locator("#live-model .consequence code").inner_text()
         tab.locator("#confirm-order").click()
         assert order_answer(tab) == "This browser is read-only."
 

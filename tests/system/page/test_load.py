@@ -257,7 +257,7 @@ def test_whatever_an_armed_browser_names_is_refused_in_plain_words(live, cookie,
 
 
 def test_another_address_without_tokens_does_not_start():
-    words = [sys.executable, "-m", "compd", "page", "/no/socket", "--listen", "0.0.0.0", "--port", "0"]
+    words = [sys.executable, "-m", "compd", "page", "--daemon", "/no/socket", "--listen", "0.0.0.0", "--port", "0"]
     ended = subprocess.run(words, capture_output=True, text=True, timeout=60, check=False)
     assert ended.returncode == 2
     message = " ".join(ended.stderr.split())

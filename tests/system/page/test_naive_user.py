@@ -62,7 +62,7 @@ def test_who_always_adds_the_effect_on_top_is_warned_before_a_wrong_one(
     chromium: Any, directory: Path, number: int
 ) -> None:
     recording = directory / "recordings" / f"hidden-{number}.csv"
-    run_in_process("campaign", str(CONFIG / "tripod-cmm.yaml"), "--hidden", str(number), "--out", str(recording))
+    run_in_process("sim", "campaign", str(CONFIG / "tripod-cmm.yaml"), "--hidden", str(number), "--out", str(recording))
     warned, unwarned = [], []
     with page_without_machine(directory) as (address, _):
         context = chromium.new_context(viewport={"width": 1366, "height": 768})

@@ -29,7 +29,7 @@ ELSEWHERE_MM = [0.3, 0.3, 0.3]
 def files(tmp_path: Path) -> tuple[Path, Path]:
     """The machine's log and the instrument's track, on another clock and in another frame."""
     campaign, log = tmp_path / "campaign.csv", tmp_path / "controller.csv"
-    run_in_process("campaign", str(CONFIG / "tripod-cmm.yaml"), "--hidden", str(HIDDEN), "--out", str(campaign))
+    run_in_process("sim", "campaign", str(CONFIG / "tripod-cmm.yaml"), "--hidden", str(HIDDEN), "--out", str(campaign))
     track = split_campaign(campaign, log, keep=()).track()
     return log, write_export(tmp_path, "csv", track, stem="tracker")
 

@@ -153,7 +153,7 @@ def test_zero(tab, live, daemon):
     text = asked(tab, "zero")
     assert "21 gauges" in text
     assert f"The zero of {before} is kept" in text
-    assert f"compd zero {live.socket}" in tab.locator(".consequence code").inner_text()
+    assert f"compd zero --daemon {live.socket}" in tab.locator(".consequence code").inner_text()
     refuses_unless_armed(tab, "zero")
     assert daemon.status()["zero"]["taken_at"] == before
     arm(tab)
@@ -171,7 +171,7 @@ def test_a_zero_that_is_elsewhere_is_taken_when_a_person_says_that_it_is_meant(t
         assert "0.5 mm" in answer
         assert "scale_1" in answer
         assert daemon.status()["zero"]["taken_at"] == before
-        assert f"compd zero {live.socket} --yes" in tab.locator(".consequence code").inner_text()
+        assert f"compd zero --daemon {live.socket} --yes" in tab.locator(".consequence code").inner_text()
         tab.locator(".consequence button", has_text="It is the zero position").click()
         answer = order_answer(tab)
         if not LATE.search(answer):
@@ -215,7 +215,7 @@ def distrusted(daemon):
 def test_shadow(tab, live, daemon, model):
     choose(tab, model)
     assert "nothing of it reaches the machine" in asked(tab, "shadow")
-    assert f"compd shadow {model} --daemon {live.socket}" in tab.locator(".consequence code").inner_text()
+    assert f"compd model shadow {model} --daemon {live.socket}" in tab.locator(".consequence code").inner_text()
     refuses_unless_armed(tab, "shadow", str(model))
     assert "shadow" not in daemon.model()
     arm(tab)
@@ -264,7 +264,7 @@ def test_no_model(tab, live, daemon, model):
     daemon.model(str(model))
     until(tab, "compd.live.setpoint?.sources_mm?.link_expansion")
     text = asked(tab, "no-model", r"changes by [+-]\d+\.\d µm at link [123]")
-    assert f"compd adopt --none --daemon {live.socket}" in text
+    assert f"compd model adopt --none --daemon {live.socket}" in text
     refuses_unless_armed(tab, "no-model")
     assert daemon.model()["applied"]["effects"] == ["link_expansion"]
     arm(tab)

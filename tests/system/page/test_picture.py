@@ -46,7 +46,7 @@ def photograph_workbench(chromium):
         recordings = directory / "recordings"
         recordings.mkdir()
         config = str(CONFIG / "tripod-cmm.yaml")
-        run_in_process("campaign", config, "--hidden", "8", "--out", str(recordings / "monday.csv"))
+        run_in_process("sim", "campaign", config, "--hidden", "8", "--out", str(recordings / "monday.csv"))
         with view(chromium, directory, recordings, "workbench?recording=monday") as tab:
             until(tab, "document.querySelectorAll('.effect').length > 5")
             tab.locator(".effect").first.click()

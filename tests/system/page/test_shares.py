@@ -37,7 +37,7 @@ def page(tmp_path_factory):
     with running_machine() as (directory, _):
         recordings = directory / "recordings"
         recordings.mkdir()
-        campaign = ("campaign", str(directory / "tripod-cmm.yaml"), "--hidden", "8")
+        campaign = ("sim", "campaign", str(directory / "tripod-cmm.yaml"), "--hidden", "8")
         run_in_process(*campaign, "--out", str(recordings / "run.csv"))
         record(recordings, gauges(20_000, 1), [hidden("link_expansion", 5.0)], name="long")
         text = (recordings / "run.csv").read_bytes()

@@ -67,7 +67,7 @@ def test_a_hidden_effect_is_found_added_and_adopted_by_mouse_with_the_ledger_of_
             order(tab, "live-adopt", "Done: adopt the shadow's model.")
         after_um = run.tip_error_um(check_visits(3, 10, heaters=True))
         run.compd(
-            *("effect", "add", effect, "--recording", recordings / "survey.csv"),
+            *("model", "add", effect, "--recording", recordings / "survey.csv"),
             *("--machine", machine, "--model", run.directory / "by-command.model.yaml"),
         )
         by_mouse = read_stored(run.directory / "survey.model.yaml")

@@ -18,7 +18,17 @@ def test_a_ball_of_which_no_row_is_known_is_placed_by_its_own_rows(tmp_path: Pat
     machine = drawing("6-ups", tmp_path)
     built(machine, np.random.default_rng(2))
     out = tmp_path / "touched.csv"
-    arguments = ["campaign", tmp_path / "built-6-ups.yaml", "--reference", reference, "--seed", "4", "--out", out]
+    arguments = [
+        "sim",
+        "campaign",
+        tmp_path / "built-6-ups.yaml",
+        "--reference",
+        reference,
+        "--seed",
+        "4",
+        "--out",
+        out,
+    ]
     assert CliRunner().invoke(app, list(map(str, arguments))).exit_code == 0
     recording = compd.open_recording(out, machine)
     result = compd.calibrate(recording, blocks=["link_zero", "base_joint_position", "platform_joint_position"])

@@ -1,4 +1,4 @@
-"""`compd compare`, `compd effect add | remove | fit | undo`, `compd ledger`, as a person types them."""
+"""`compd compare`, `compd model add | remove | fit | undo`, `compd model ledger`, as a person types them."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ import yaml
 from typer.testing import CliRunner
 
 from compd.cli.measurements.compare import compare
-from compd.cli.measurements.effect import add, fit, remove, undo
-from compd.cli.measurements.ledger import ledger
+from compd.cli.measurements.model.effect import add, fit, remove, undo
+from compd.cli.measurements.model.ledger import ledger
 from compd.errors import CompdError, RecordingError, StateError
 from compd.model_file import read_model_file
 from tests.support.external import write_external

@@ -92,7 +92,7 @@ def test_formulas_pasted_from_the_terminal_are_a_file_of_effects() -> None:
     assert [find_effect(entry, "pasted").id for entry in entries] == [
         f"reference_follows_{name.lower()}_linear_x" for name in FRAME
     ]
-    assert f"compd effect add described.yaml:{entries[0]['id']} --recording stage.csv --model FILE" in lines
+    assert f"compd model add described.yaml:{entries[0]['id']} --recording stage.csv --model FILE" in lines
 
 
 def test_what_to_vary_is_said_once() -> None:

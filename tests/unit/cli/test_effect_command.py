@@ -1,4 +1,4 @@
-"""`compd effect list` and `compd effect show`."""
+"""`compd model effects` and `compd model effect`."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from compd.cli.measurements.effect import effect as command
+from compd.cli.measurements.model.effect import effect as command
 from compd.errors import CompdError
 from compd.model.library import BUNDLED
 from compd.report.effect_signature import compute_signature
@@ -18,7 +18,7 @@ from tests.support.paths import CONFIG
 
 
 def test_the_list_holds_every_effect() -> None:
-    result = CliRunner().invoke(command, ["list"], env={"COLUMNS": "200"})
+    result = CliRunner().invoke(command, ["effects"], env={"COLUMNS": "200"})
     assert result.exit_code == 0
     for effect in BUNDLED:
         assert effect.id in result.output
@@ -29,7 +29,7 @@ def test_the_card_says_everything_and_the_page_is_drawn(tmp_path: Path) -> None:
     page = tmp_path / "page.html"
     result = CliRunner().invoke(
         command,
-        ["show", "link_expansion_lag", "--machine", str(CONFIG / "tripod-cmm.yaml"), "--html", str(page)],
+        ["effect", "link_expansion_lag", "--machine", str(CONFIG / "tripod-cmm.yaml"), "--html", str(page)],
         env={"COLUMNS": "200"},
     )
     assert result.exit_code == 0
@@ -43,7 +43,7 @@ def test_the_card_says_everything_and_the_page_is_drawn(tmp_path: Path) -> None:
 
 def test_the_card_says_what_the_machine_lacks() -> None:
     result = CliRunner().invoke(
-        command, ["show", "joint_runout", "--machine", str(CONFIG / "hexapod.yaml")], env={"COLUMNS": "200"}
+        command, ["effect", "joint_runout", "--machine", str(CONFIG / "hexapod.yaml")], env={"COLUMNS": "200"}
     )
     assert result.exit_code == 0
     assert "only a tripod" in result.output
@@ -68,22 +68,22 @@ def printed(*arguments: object) -> str:
 def test_effects_of_a_file_are_listed_and_shown(tmp_path: Path) -> None:
     file = tmp_path / "mount.yaml"
     file.write_text(TILT)
-    listed = printed("list", "--effects", file)
+    listed = printed("effects", "--effects", file)
     assert "tilt" in listed
     assert "offset" in listed
     assert "link_expansion" not in listed
-    for arguments in (["show", f"{file}:tilt"], ["show", "tilt", "--effects", file]):
+    for arguments in (["effect", f"{file}:tilt"], ["effect", "tilt", "--effects", file]):
         card = printed(*arguments)
         assert "delta_y = k * cos(azimuth_deg * deg)" in card
         assert "needs         azimuth_deg" in card
         assert "tripod-cmm" not in card, "nobody named a machine"
-    assert "on tripod-cmm" in printed("show", f"{file}:tilt", "--machine", CONFIG / "tripod-cmm.yaml")
-    refused = CliRunner().invoke(command, ["show", str(file)])
+    assert "on tripod-cmm" in printed("effect", f"{file}:tilt", "--machine", CONFIG / "tripod-cmm.yaml")
+    refused = CliRunner().invoke(command, ["effect", str(file)])
     assert isinstance(refused.exception, CompdError)
     assert "holds several effects: which one?" in str(refused.exception)
     one = tmp_path / "one.yaml"
     one.write_text(TILT.split("- {id: offset", maxsplit=1)[0].replace("\n  ", "\n").removeprefix("- "))
-    assert "The axis is not vertical." in printed("show", one)
+    assert "The axis is not vertical." in printed("effect", one)
 
 
 @pytest.mark.parametrize("effect", BUNDLED, ids=lambda effect: effect.id)
@@ -112,7 +112,7 @@ def test_the_hysteresis_curve_is_a_loop() -> None:
 
 
 def add_formula(directory: Path, formula: str) -> str:
-    """What `compd effect add` of a formula says, of 30 rows with a temperature that changes."""
+    """What `compd model add` of a formula says, of 30 rows with a temperature that changes."""
     (directory / "mine.yaml").write_text(
         f"{{id: mine, port: link, formula: {formula}, physics: Grows., "
         "parameters: {k: {unit: um/K, plausible: [-10, 10], source: mine}}}"

@@ -49,7 +49,7 @@ def test_the_extras_are_those_of_the_project_with_their_packages() -> None:
 @pytest.mark.parametrize(
     ("arguments", "where", "package", "extra"),
     [
-        (["page", "config/tripod-cmm.yaml"], "compd page", "", "page"),
+        (["page", "--daemon", "config/tripod-cmm.yaml"], "compd page", "", "page"),
         (["demo", "--live"], "compd demo", "", "page"),
         (["fleet", "report", "x"], "compd fleet", "distributed", "fleet"),
         (["compare", "x.csv", "--html", "x.html"], "compd compare", "plotly", "report"),

@@ -11,8 +11,8 @@ from typing import Any
 import pytest
 from typer.testing import CliRunner
 
-from compd.cli.live import driver as driver_cli
-from compd.cli.live import gauge as gauge_cli
+from compd.cli.live.gauge import driver as driver_cli
+from compd.cli.live.gauge import gauge as gauge_cli
 from compd.clock import MonotonicClock
 from compd.configuration import load as load_machine
 from compd.errors import CompdError
@@ -336,11 +336,11 @@ def test_learn_a_device_that_sends_unsolicited(tmp_path: Path) -> None:
 
 
 def test_driver_test_prints_every_case_and_fails_by_exit_code(tmp_path: Path) -> None:
-    result = RUNNER.invoke(driver_cli.driver, ["test", "heidenhain_nd28x", "--quick"])
+    result = RUNNER.invoke(driver_cli.driver, ["heidenhain_nd28x", "--quick"])
     assert result.exit_code == 0
     assert "nothing failed" in result.output
     assert "not detectable on this wire" in result.output
     options = tmp_path / "options.yaml"
     options.write_text("unit: inch\n")
-    result = RUNNER.invoke(driver_cli.driver, ["test", "heidenhain_nd28x", "--quick", "--options", str(options)])
+    result = RUNNER.invoke(driver_cli.driver, ["heidenhain_nd28x", "--quick", "--options", str(options)])
     assert result.exit_code == 0

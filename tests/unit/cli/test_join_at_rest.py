@@ -1,4 +1,4 @@
-"""`compd join` of points without time: nothing is joined by order or by name that nobody asked for."""
+"""`compd recording join` of points without time: nothing is joined by order or by name that nobody asked for."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def listed(path: Path, tip_mm: FloatArray, head: str = "", row: str = "P{number:
 
 def join(export: Path, *words: str) -> Result:
     gauges, out = export.with_name("gauges.csv"), export.with_name("joined.csv")
-    return CliRunner().invoke(app, ["join", str(gauges), str(export), str(out), *words])
+    return CliRunner().invoke(app, ["recording", "join", str(gauges), str(export), str(out), *words])
 
 
 def refusal(result: Result) -> str:

@@ -14,7 +14,7 @@ from typer.testing import CliRunner
 import compd
 from compd.cli.measurements.compare import compare
 from compd.cli.measurements.diagnose import diagnose
-from compd.cli.measurements.effect import add, fit
+from compd.cli.measurements.model.effect import add, fit
 from compd.comparison import is_long
 from compd.comparison import open as open_module
 from compd.model_file import read_model_file

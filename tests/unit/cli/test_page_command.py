@@ -12,7 +12,10 @@ from compd.cli.app import app
     ("words", "typed"),
     [
         ([], "compd page --listen 127.0.0.1 --tokens t.yaml"),
-        (["my machine.yaml", "--read-only"], "compd page 'my machine.yaml' --listen 127.0.0.1 --tokens t.yaml"),
+        (
+            ["--daemon", "my machine.yaml", "--read-only"],
+            "compd page --daemon 'my machine.yaml' --listen 127.0.0.1 --tokens t.yaml",
+        ),
     ],
 )
 def test_tokens_that_no_browser_can_use_are_refused(monkeypatch, words, typed):

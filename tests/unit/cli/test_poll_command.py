@@ -1,4 +1,4 @@
-"""`compd poll` beside a running daemon: a unit behind a gateway that is asked seldom, and has come back."""
+"""`compd gauge poll` beside a running daemon: a unit behind a gateway that is asked seldom, and has come back."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import yaml
 from typer.testing import CliRunner
 
 from compd.cli.app import app
-from compd.cli.live.poll import gauge_status
+from compd.cli.live.gauge.poll import gauge_status
 from compd.client import connect
 from compd.configuration import load
 from compd.documents import read_document
@@ -53,7 +53,7 @@ def test_a_unit_that_has_come_back_is_asked_at_once(tmp_path: Path) -> None:
         )
 
         def poll(gauge: str) -> tuple[int, str]:
-            result = CliRunner().invoke(app, ["poll", gauge, "--daemon", str(socket)])
+            result = CliRunner().invoke(app, ["gauge", "poll", gauge, "--daemon", str(socket)])
             return result.exit_code, result.output
 
         with supervised(configuration), connect(socket, TIMEOUT_S) as client:

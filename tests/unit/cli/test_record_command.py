@@ -1,4 +1,4 @@
-"""`compd record` beside a running daemon: killed, stopped, left alone by it; and what the daemon tells it."""
+"""`compd recording start` beside a running daemon: killed, stopped, left alone by it; and what the daemon tells it."""
 
 from __future__ import annotations
 
@@ -85,11 +85,20 @@ def drifting(monkeypatch):
 
 @contextmanager
 def record_command(directory, *arguments):
-    """`compd record` as a process, once it has begun to write.
+    """`compd recording start` as a process, once it has begun to write.
 
     It heeds SIGINT also where this process does not, as one that a script started with `&`.
     """
-    command = [sys.executable, "-m", "compd", "record", str(directory / "run"), "--daemon", str(directory / "s")]
+    command = [
+        sys.executable,
+        "-m",
+        "compd",
+        "recording",
+        "start",
+        str(directory / "run"),
+        "--daemon",
+        str(directory / "s"),
+    ]
     heeded = signal.signal(signal.SIGINT, signal.default_int_handler)
     try:
         process = subprocess.Popen([*command, *arguments], stderr=subprocess.PIPE, text=True)
@@ -210,7 +219,7 @@ def test_while_the_daemon_is_away_ctrl_c_ends_it_with_everything_written(tmp_pat
 @pytest.mark.long
 @pytest.mark.usefixtures("drifting")
 def test_a_burst_has_every_cycle_for_as_long_as_asked_and_no_longer(tmp_path, capsys, monkeypatch):
-    from compd.cli.live.record import record
+    from compd.cli.measurements.recording.start import start as record
 
     monkeypatch.setattr(signal, "signal", lambda *_: None)  # this process keeps its own
     with daemon_at(tmp_path):

@@ -1,4 +1,4 @@
-"""`compd fault` and `compd tracker` beside a simulated machine, and without one."""
+"""`compd sim fault` and `compd sim tracker` beside a simulated machine, and without one."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from typing import Any, Self
 
 import pytest
 
-from compd.cli.simulated.fault import fault
-from compd.cli.simulated.tracker import ExportFormat, tracker
+from compd.cli.simulated.sim.fault import fault
+from compd.cli.simulated.sim.tracker import ExportFormat, tracker
 from compd.clock import MonotonicClock
 from compd.configuration import load
 from compd.errors import CompdError, DaemonError
@@ -105,7 +105,7 @@ def test_the_tracker_writes_each_shape(simulation, tmp_path: Path, capsys, shape
     assert out.read_bytes().startswith(first)
     said = capsys.readouterr().out
     assert "30 looks" in said
-    assert ("give `compd join`: --unit mm --rate-hz 5000" in said) == (shape == "blanks")
+    assert ("give `compd recording join`: --unit mm --rate-hz 5000" in said) == (shape == "blanks")
 
 
 @pytest.mark.usefixtures("daemon")
@@ -118,7 +118,7 @@ def test_an_interferometer_along_a_link(simulation, tmp_path: Path, capsys) -> N
     assert abs(first_um) < 0.25
     said = capsys.readouterr().out
     assert "the interferometer along link 2 looks" in said
-    assert "give `compd join`: --unit um --link 2" in said
+    assert "give `compd recording join`: --unit um --link 2" in said
 
 
 @pytest.mark.usefixtures("daemon")

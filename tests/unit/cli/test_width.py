@@ -59,9 +59,9 @@ def test_a_ledger_has_whole_names_and_numbers(printed, tmp_path):
         f"id: {name}\nport: link\nformula: k * temperature_room_degC\nphysics: Grows.\n"
         "parameters: {k: {unit: um/K, plausible: [-10, 10], source: mine}}\n"
     )
-    printed("campaign", CONFIG / "tripod-cmm.yaml", "--seed", "3", "--out", recording)
-    assert f" {name} " in printed("effect", "add", effects, "--recording", recording, "--model", model)
-    text = printed("ledger", model)
+    printed("sim", "campaign", CONFIG / "tripod-cmm.yaml", "--seed", "3", "--out", recording)
+    assert f" {name} " in printed("model", "add", effects, "--recording", recording, "--model", model)
+    text = printed("model", "ledger", model)
     assert f" {name} " in text
     assert "residuals in um" in " ".join(text.split())
     assert " run.csv " in text

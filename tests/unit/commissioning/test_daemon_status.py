@@ -42,8 +42,8 @@ def daemon(path: Path, state: str, reason: str = "", gauges: Any = GOOD) -> Iter
         yield address
 
 
-def invoke(*arguments: str) -> tuple[int, str]:
-    done = CliRunner().invoke(app, ["status", *arguments])
+def invoke(address: str, *options: str) -> tuple[int, str]:
+    done = CliRunner().invoke(app, ["status", "--daemon", address, *options])
     return done.exit_code, done.stdout
 
 
@@ -99,7 +99,7 @@ def test_a_daemon_that_makes_no_setpoint_is_critical(tmp_path: Path) -> None:
 
 def test_the_same_as_json(tmp_path: Path) -> None:
     with daemon(tmp_path, "hold", "joints.1: timeout") as address:
-        code, text = invoke("--json", address)
+        code, text = invoke(address, "--json")
     found = json.loads(text)
     assert (code, found["health"], found["state"], found["valid"]) == (1, "warning", "hold", True)
     assert found["status"]["class"] == "STATUS"

@@ -1,4 +1,4 @@
-"""`compd driver test` finds every driver that is wrong, says what is wrong with it, and leaves the right ones alone."""
+"""`compd gauge test-driver` finds every driver that is wrong, says what is wrong with it, and leaves others alone."""
 
 from __future__ import annotations
 
@@ -132,7 +132,7 @@ def test_every_driver_of_the_file_is_tried() -> None:
 def test_from_the_command_line(name: str, code: int) -> None:
     gauge = f"{inspect.getfile(DRIVERS[name])}:{name}"
     device = f"{inspect.getfile(DRIVERS[name].device)}:{DRIVERS[name].device.__name__}"
-    result = CliRunner().invoke(app, ["driver", "test", gauge, "--simulator", device, "--quick"])
+    result = CliRunner().invoke(app, ["gauge", "test-driver", gauge, "--simulator", device, "--quick"])
     assert result.exit_code == code, result.output
     assert ("cases failed" in result.output) == bool(code)
     assert ("nothing failed" in result.output) == (not code)

@@ -232,18 +232,18 @@ TRIPOD = str(CONFIG / "tripod-cmm.yaml")
 COMMANDS: dict[str, tuple[str, list[str]]] = {
     "check": ("machine.yaml", ["check", "FILE"]),
     "run": ("machine.yaml", ["run", "FILE"]),
-    "page": ("machine.yaml", ["page", "FILE"]),
+    "page": ("machine.yaml", ["page", "--daemon", "FILE"]),
     "page --tokens": ("tokens.yaml", ["page", "--tokens", "FILE", "--listen", "127.0.0.1"]),
     "page --new-token": ("tokens.yaml", ["page", "--tokens", "FILE", "--new-token", "view:anna"]),
     "compare": ("run.csv", ["compare", "FILE", "--machine", TRIPOD]),
-    "effect remove": ("x.model.yaml", ["effect", "remove", "link_sag", "--model", "FILE"]),
+    "model remove": ("x.model.yaml", ["model", "remove", "link_sag", "--model", "FILE"]),
     "diagnose --effects": ("own.yaml", ["diagnose", "none.csv", "--effects", "FILE"]),
-    "effect show": ("own.yaml", ["effect", "show", "FILE"]),
-    "ledger": ("x.model.yaml", ["ledger", "FILE"]),
+    "model effect": ("own.yaml", ["model", "effect", "FILE"]),
+    "model ledger": ("x.model.yaml", ["model", "ledger", "FILE"]),
     "recording check": ("run.csv", ["recording", "check", "FILE"]),
-    "join": ("export.txt", ["join", "none.csv", "FILE"]),
-    "driver test --options": ("options.yaml", ["driver", "test", "serial_ascii", "--options", "FILE"]),
-    "campaign --plan": ("plan.csv", ["campaign", TRIPOD, "--plan", "FILE", "--out", "out.csv"]),
+    "recording join": ("export.txt", ["recording", "join", "none.csv", "FILE"]),
+    "gauge test-driver --options": ("options.yaml", ["gauge", "test-driver", "serial_ascii", "--options", "FILE"]),
+    "sim campaign --plan": ("plan.csv", ["sim", "campaign", TRIPOD, "--plan", "FILE", "--out", "out.csv"]),
 }
 
 

@@ -48,9 +48,9 @@ def test_what_is_no_file_is_never_written_over(tmp_path, make):
     [
         ("compare", "RUN", "--html", "RUN"),
         ("diagnose", "RUN", "--html", "RUN"),
-        ("effect", "show", "link_expansion", "--html", "RUN"),
+        ("model", "effect", "link_expansion", "--html", "RUN"),
         ("plan", "RUN", "--rivals", "link_expansion,link_zero", "--out", "RUN"),
-        ("tracker", "DIRECTORY", "--out", "RUN"),
+        ("sim", "tracker", "DIRECTORY", "--out", "RUN"),
         ("gauge", "learn", "--unit", "mm", "CAPTURE", "--to", "RUN"),
         ("demo", "--page", "RUN"),
     ],

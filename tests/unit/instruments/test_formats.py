@@ -16,7 +16,7 @@ from typer.testing import CliRunner
 
 from compd.cli.app import app
 from compd.cli.export_options import Shape
-from compd.cli.simulated.tracker import ExportFormat
+from compd.cli.simulated.sim.tracker import ExportFormat
 from compd.errors import CompdError
 from compd.instruments import formats
 from compd.instruments.export import ReadOptions
@@ -72,8 +72,8 @@ def shown() -> dict[str, Any]:
     page_client.get("/", params={"token": "x"})
     environment = {"COLUMNS": "250", "TERM": "dumb"}
     return {
-        "join": CliRunner().invoke(app, ["join", "--help"], env=environment).output,
-        "tracker": CliRunner().invoke(app, ["tracker", "--help"], env=environment).output,
+        "join": CliRunner().invoke(app, ["recording", "join", "--help"], env=environment).output,
+        "tracker": CliRunner().invoke(app, ["sim", "tracker", "--help"], env=environment).output,
         "--as of join": list(Shape),
         "--as of tracker": list(ExportFormat),
         "page": page_client.get("/join/sources").json()["formats"],
@@ -176,7 +176,7 @@ def test_two_formats_of_one_name_are_refused(monkeypatch: pytest.MonkeyPatch, tm
 @pytest.mark.parametrize(
     ("code", "imported"),
     [
-        ("import compd.cli.measurements.join, compd.cli.simulated.tracker", []),
+        ("import compd.cli.measurements.recording.join, compd.cli.simulated.sim.tracker", []),
         ("import compd.page.joining.joiner", []),
         (
             "from pathlib import Path; from compd.instruments.read import *; read_export(Path(sys.argv[1]))",

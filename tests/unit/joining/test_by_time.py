@@ -7,11 +7,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from typer import Typer
 from typer.testing import CliRunner
 
 from compd.arrays import FloatArray
-from compd.cli.measurements.join import join as join_command
+from compd.cli.app import app
 from compd.errors import RecordingError
 from compd.instruments import ReadOptions, Track, read_export
 from compd.instruments import track_of as track_of_export
@@ -24,13 +23,6 @@ from tests.support.two_clocks import TipPath, random_path, track_of
 
 SCALE_NOISE_MM, TRACKER_NOISE_MM = 1e-4, 0.005
 SIDECAR = {"machine": "tripod-cmm"}
-app = Typer()
-app.command()(join_command)
-
-
-@app.callback()
-def _several() -> None:
-    """Keeps `join` a command of its own, as in `compd`."""
 
 
 def join_reference(
@@ -201,7 +193,7 @@ def test_offset_by_hand_and_refusals_write_nothing(tmp_path: Path) -> None:
     track, _ = track_of(motion, rng, 30.0, 0.1, 0.001)
     path = gauges(tmp_path / "g.csv", motion, np.arange(5.0, 40.0, 0.5), rng)
     export(tmp_path / "t.csv", track)
-    arguments = ["join", str(path), str(tmp_path / "t.csv"), str(tmp_path / "out.csv")]
+    arguments = ["recording", "join", str(path), str(tmp_path / "t.csv"), str(tmp_path / "out.csv")]
     result = CliRunner().invoke(app, arguments)
     assert isinstance(result.exception, RecordingError)
     assert "stands still" in str(result.exception)
@@ -235,7 +227,17 @@ def test_command_shows_the_offset_and_its_uncertainty(tmp_path: Path) -> None:
     track, _ = track_of(motion, rng, 4.5, 0.1, TRACKER_NOISE_MM)
     path = gauges(tmp_path / "g.csv", motion, np.arange(0.0, motion.end_s, 0.2), rng)
     names = export(tmp_path / "t.csv", track, "when_s,a,b,c")
-    arguments = ["join", str(path), str(names), str(tmp_path / "out.csv"), "--time", "when_s", "--unit", "mm"]
+    arguments = [
+        "recording",
+        "join",
+        str(path),
+        str(names),
+        str(tmp_path / "out.csv"),
+        "--time",
+        "when_s",
+        "--unit",
+        "mm",
+    ]
     result = CliRunner().invoke(app, [*arguments, "--x", "a", "--y", "b", "--z", "c", "--frame", "machine"])
     assert result.exit_code == 0, result.output
     assert "clock offset +4.5" in result.output

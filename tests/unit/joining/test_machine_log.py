@@ -47,7 +47,7 @@ def measured(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, np.ndarray
 
 
 def join(directory: Path, log: str, out: str, *options: str) -> Result:
-    arguments = ["join", directory / log, directory / "points.csv", directory / out, "--by", "order"]
+    arguments = ["recording", "join", directory / log, directory / "points.csv", directory / out, "--by", "order"]
     arguments += ["--machine", directory / "6-ups.yaml", "--frame", "machine", *options]
     return CliRunner().invoke(app, list(map(str, arguments)))
 
@@ -74,7 +74,7 @@ def test_the_machine_is_asked_for_once(measured: tuple[Path, np.ndarray], tmp_pa
     assert all("machine_file: 6-ups.yaml" in text and str(directory) not in text for text in sidecars)
     # joined again, the recording of the log says whose it is
     points, again = directory / "points.csv", tmp_path / "again.csv"
-    arguments = map(str, ["join", directory / "once-machine.csv", points, again, "--by", "order"])
+    arguments = map(str, ["recording", "join", directory / "once-machine.csv", points, again, "--by", "order"])
     assert CliRunner().invoke(app, list(arguments)).exit_code == 0
     assert f"machine_file: {directory.resolve() / '6-ups.yaml'}" in again.with_suffix(".yaml").read_text()
     assert open_recording(again).measured_mm.shape == (14, 3)
@@ -185,7 +185,7 @@ def test_a_join_that_fails_leaves_no_file(measured: tuple[Path, np.ndarray], tmp
     directory, _ = measured
     out = tmp_path / "out.csv"
     named = [part for i in LEGS for part in ("--log", f"Leg {i} [m]=scale_{i}_mm")]
-    arguments = ["join", directory / "log.txt", directory / "points.csv", out, "--by", "time", *named]
+    arguments = ["recording", "join", directory / "log.txt", directory / "points.csv", out, "--by", "time", *named]
     failed = CliRunner().invoke(app, list(map(str, [*arguments, "--machine", directory / "6-ups.yaml"])))
     assert failed.exit_code != 0
     assert list(tmp_path.iterdir()) == []
@@ -205,7 +205,7 @@ def test_ids_of_points_that_are_texts_stay_texts(measured: tuple[Path, np.ndarra
     export.write_text("\n".join(["name;x [mm];y [mm];z [mm]", *reversed(moved)]) + "\n", encoding="utf-8")
     named = [part for i in LEGS for part in ("--log", f"L{i} [mm]=scale_{i}_mm")]
     for out in (tmp_path / "joined.csv", tmp_path / "joined-too.parquet"):
-        arguments = ["join", log, export, out, "--by", "name", *named, "--log", "Where=point"]
+        arguments = ["recording", "join", log, export, out, "--by", "name", *named, "--log", "Where=point"]
         arguments += ["--machine", directory / "6-ups.yaml"]
         done = CliRunner().invoke(app, list(map(str, arguments)))
         assert done.exit_code == 0, (done.output, done.exception)

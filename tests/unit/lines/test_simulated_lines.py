@@ -1,4 +1,4 @@
-"""Simulated lines: what a person, or `compd simulate`, can do with them."""
+"""Simulated lines: what a person, or `compd sim run`, can do with them."""
 
 from __future__ import annotations
 

@@ -22,7 +22,7 @@ MACHINES = [("tripod-cmm.yaml", 3), ("hexapod.yaml", 6)]
 
 
 def expansion(path, name, links, ppm_per_K=11.5, std=0.1, **parts):
-    """A model file with one effect, as `compd effect add` writes it."""
+    """A model file with one effect, as `compd model add` writes it."""
     file = ModelFile(
         name.removesuffix(".yaml"),
         links,
@@ -81,7 +81,7 @@ def test_a_person_may_mean_it(tmp_path):
     file.write_text(yaml.safe_dump(data))
     model = live.loader.read(file)
     assert model.summary["warnings"] == [
-        "has no checksum: what was changed in it after it was written cannot be seen: `compd effect fit` writes one"
+        "has no checksum: what was changed in it after it was written cannot be seen: `compd model fit` writes one"
     ]
 
 

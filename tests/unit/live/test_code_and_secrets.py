@@ -14,7 +14,7 @@ from pathlib import Path
 
 import pytest
 
-from compd.cli.live.adopt import adopt
+from compd.cli.measurements.model.adopt import adopt
 from compd.client import connect
 from compd.configuration.effect_files import EffectFile
 from compd.errors import CompdError, DaemonError

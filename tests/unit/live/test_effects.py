@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from compd.cli.live.adopt import adopt
-from compd.cli.live.shadow import shadow
+from compd.cli.measurements.model.adopt import adopt
+from compd.cli.measurements.model.shadow import shadow
 from compd.client import connect
 from compd.errors import CompdError, DaemonError, StateError
 from compd.gauge import Quality

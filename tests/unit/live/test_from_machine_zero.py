@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import yaml
 
-from compd.cli.live.adopt import adopt
+from compd.cli.measurements.model.adopt import adopt
 from compd.errors import DaemonError
 from compd.gauge import Quality
 from compd.live import daemon as daemon_module

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 import typer
 
-from compd.cli.live.replay import replay as replay_command
+from compd.cli.measurements.recording.replay import replay as replay_command
 from compd.configuration import load
 from compd.errors import RecordingError, StateError
 from compd.kernel_versions import versions_text_here
@@ -391,7 +391,7 @@ def test_a_recording_of_another_machine_is_refused(tmp_path):
 
 
 def test_what_is_not_there_is_told_with_what_would_be_right(tmp_path):
-    with pytest.raises(RecordingError, match="a recording by `compd record`"):
+    with pytest.raises(RecordingError, match="a recording by `compd recording start`"):
         RecordedCycles(tmp_path / "nothing")
 
 

@@ -40,7 +40,7 @@ def test_zero_names_the_gauges_the_old_zero_and_what_becomes_of_the_correction(l
     assert "21 gauges" in consequence.text
     assert "02:06" in consequence.text
     assert "up to 10.0 µm" in consequence.text
-    assert consequence.command == "compd zero /run/compd/compd.sock"
+    assert consequence.command == "compd zero --daemon /run/compd/compd.sock"
 
 
 def test_accept_names_the_gauges_that_wait_and_why(link):
@@ -75,7 +75,7 @@ def test_a_model_is_adopted_when_its_shadow_has_told_the_change(link):
     consequence = Orders(link).consequence("adopt", "")
     assert consequence.possible
     assert consequence.subject == HASH, "what was told is what is adopted, whatever becomes of its file"
-    assert consequence.command == "compd adopt /a.yaml --daemon /run/compd/compd.sock"
+    assert consequence.command == "compd model adopt /a.yaml --daemon /run/compd/compd.sock"
     assert "-10.0 µm at link 1" in consequence.text
     assert "0.0 s" in consequence.text
 
@@ -101,7 +101,7 @@ def test_no_model_is_adopted_but_the_one_whose_change_is_told(link, tmp_path):
 def test_without_effects_the_correction_loses_theirs(link):
     consequence = Orders(link).consequence("no-model", "")
     assert "-5.0 µm at link 1" in consequence.text
-    assert consequence.command == "compd adopt --none --daemon /run/compd/compd.sock"
+    assert consequence.command == "compd model adopt --none --daemon /run/compd/compd.sock"
     link.readings = {"setpoint": {"valid": False}}
     consequence = Orders(link).consequence("no-model", "")
     assert consequence.possible

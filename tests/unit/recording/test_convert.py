@@ -9,7 +9,7 @@ import pyarrow.parquet as pq
 import pytest
 from typer.testing import CliRunner
 
-from compd.cli.measurements.recording import recording as recording_command
+from compd.cli.measurements.recording.recording import recording as recording_command
 from compd.errors import RecordingError
 from compd.recording.convert import convert_recording
 from compd.recording.open_part import OpenPartFormat, close_part

@@ -11,7 +11,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from typer.testing import CliRunner
 
-from compd.cli.measurements.recording import recording as recording_command
+from compd.cli.measurements.recording.recording import recording as recording_command
 from compd.columns import is_covariate
 from compd.configuration import load
 from compd.errors import RecordingError
@@ -245,7 +245,7 @@ def test_points_may_have_names(tmp_path: Path) -> None:
 
 def test_gauges_alone_are_for_join_only(tmp_path: Path) -> None:
     path = write_recording_files(tmp_path, NO_REFERENCE(csv_text()), "machine: tripod-cmm\n")
-    with pytest.raises(RecordingError, match="compd join"):
+    with pytest.raises(RecordingError, match="compd recording join"):
         read_recording(path)
     assert read_recording(path, needs_reference=False).reference is None
 

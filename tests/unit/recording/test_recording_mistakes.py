@@ -10,7 +10,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from typer.testing import CliRunner
 
-from compd.cli.measurements.recording import recording as recording_command
+from compd.cli.measurements.recording.recording import recording as recording_command
 from compd.configuration import load
 from compd.errors import RecordingError
 from compd.recording.reader import read_recording
@@ -130,7 +130,7 @@ def test_mistake_is_refused_in_words(tmp_path: Path, mistake: str) -> None:
 SIDECARS: dict[str, tuple[str, list[str]]] = {
     "unknown key": (SIDECAR + "machin: x\n", ["run.yaml:6 machin: unknown key", "did you mean `machine`?"]),
     "no machine": (SIDECAR.replace("machine: tripod-cmm\n", ""), ["names no machine"]),
-    "no reference": ("machine: tripod-cmm\n", ["names no reference", "compd join"]),
+    "no reference": ("machine: tripod-cmm\n", ["names no reference", "compd recording join"]),
     "no reference of a model of one's own": (
         "machine: external\n",
         ["names no reference", "write reference: {quantity"],

@@ -10,8 +10,8 @@ from functools import cache
 import numpy as np
 import pytest
 
-from compd.cli.simulated.campaign import campaign
-from compd.cli.simulated.simulate import simulate
+from compd.cli.simulated.sim.campaign import campaign
+from compd.cli.simulated.sim.run import run as simulate
 from compd.configuration import load, shipped_configuration
 from compd.simulation.causes.catalogue import CAUSES, build_cause, possible_causes
 from compd.simulation.truth.cause import Cause

@@ -232,7 +232,7 @@ def test_command_writes_what_the_workbench_reads(
     tmp_path: Path, config: Path, options: list[str], quantity: str
 ) -> None:
     out = tmp_path / "days.csv"
-    result = CliRunner().invoke(app, ["campaign", str(config), "--out", str(out), "--seed", "2", *options])
+    result = CliRunner().invoke(app, ["sim", "campaign", str(config), "--out", str(out), "--seed", "2", *options])
     assert result.exit_code == 0, result.output
     recording = read_recording(out, load(config))
     assert recording.reference is not None

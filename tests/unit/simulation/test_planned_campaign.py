@@ -312,6 +312,6 @@ def test_the_same_seed_measures_the_same_and_another_day_does_not(tmp_path: Path
 def test_a_ball_plate_stays_where_it_is(tmp_path: Path) -> None:
     path = plan_file(tmp_path / "next.csv", [{}])
     options = ["--out", str(tmp_path / "next_days.csv"), "--plan", str(path), "--reference", "ball_plate"]
-    result = CliRunner().invoke(app, ["campaign", str(TRIPOD), *options])
+    result = CliRunner().invoke(app, ["sim", "campaign", str(TRIPOD), *options])
     assert isinstance(result.exception, CompdError)
     assert "ball plate's balls" in str(result.exception)

@@ -29,6 +29,6 @@ def test_priority_is_asked_for_before_the_lines_have_threads(
         return start(simulation)
 
     monkeypatch.setattr(Simulation, "start", started)
-    run_in_process("simulate", str(CONFIG / name), "--directory", str(tmp_path), "--seconds", "0")
+    run_in_process("sim", "run", str(CONFIG / name), "--directory", str(tmp_path), "--seconds", "0")
     assert asked == [(os.SCHED_FIFO, 5)], "below acquisition's 10 and the loop's 40"
     assert began == [1]

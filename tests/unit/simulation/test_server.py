@@ -243,7 +243,7 @@ def test_a_driver_without_a_simulated_device_is_named(monkeypatch: pytest.Monkey
 @pytest.mark.long
 def test_the_command_serves_until_it_is_stopped() -> None:
     with run_directory() as directory:
-        command = [sys.executable, "-m", "compd", "simulate", str(TRIPOD), "--directory", str(directory)]
+        command = [sys.executable, "-m", "compd", "sim", "run", str(TRIPOD), "--directory", str(directory)]
         environment = {**os.environ, "COLUMNS": "160"}
         with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=environment) as process:
             assert process.stdout is not None
@@ -267,7 +267,7 @@ def test_the_command_serves_until_it_is_stopped() -> None:
 def test_the_command_hides_a_cause_under_seal() -> None:
     with run_directory() as directory:
         options = ["--directory", str(directory), "--hidden", "3", "--seconds", "0"]
-        command = [sys.executable, "-m", "compd", "simulate", str(TRIPOD), *options]
+        command = [sys.executable, "-m", "compd", "sim", "run", str(TRIPOD), *options]
         finished = subprocess.run(command, capture_output=True, text=True, check=True)
         answer = json.loads((directory / "hidden.answer.json").read_text(encoding="utf-8"))
         (name,) = answer["effects"]
@@ -280,7 +280,7 @@ def test_the_command_hides_a_cause_under_seal() -> None:
 def test_the_command_hides_a_cause_that_was_stated() -> None:
     with run_directory() as directory:
         options = ["--directory", str(directory), "--effect", "link_expansion=8", "--seconds", "0"]
-        command = [sys.executable, "-m", "compd", "simulate", str(TRIPOD), *options]
+        command = [sys.executable, "-m", "compd", "sim", "run", str(TRIPOD), *options]
         subprocess.run(command, capture_output=True, text=True, check=True)
         answer = json.loads((directory / "hidden.answer.json").read_text(encoding="utf-8"))
         assert answer["effects"] == {"link_expansion": 8.0}
@@ -292,7 +292,7 @@ def test_the_machines_own_directory_is_refused_and_left_alone() -> None:
         own = directory / TRIPOD.name
         own.write_text(TRIPOD.read_text())
         finished = subprocess.run(
-            [sys.executable, "-m", "compd", "simulate", str(own), "--directory", str(directory)],
+            [sys.executable, "-m", "compd", "sim", "run", str(own), "--directory", str(directory)],
             capture_output=True,
             text=True,
             check=False,

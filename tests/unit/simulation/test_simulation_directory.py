@@ -97,14 +97,14 @@ def test_the_socket_of_a_daemon_that_still_runs_stays(directory: Path) -> None:
 
 def test_a_configuration_that_no_simulator_wrote_is_not_replaced(directory: Path) -> None:
     (directory / NAME).write_text("machine: mine\n")
-    with pytest.raises(CompdError, match="was not written by `compd simulate`"):
+    with pytest.raises(CompdError, match="was not written by `compd sim run`"):
         SimulationDirectory(directory, NAME).begin()
     assert (directory / NAME).read_text() == "machine: mine\n"
 
 
 @pytest.mark.parametrize("end", sampled([signal.SIGINT, signal.SIGTERM, signal.SIGHUP], 3))
 def test_the_command_leaves_nothing_however_it_is_ended(directory: Path, end: signal.Signals) -> None:
-    command = [sys.executable, "-m", "compd", "simulate", str(TRIPOD), "--directory", str(directory)]
+    command = [sys.executable, "-m", "compd", "sim", "run", str(TRIPOD), "--directory", str(directory)]
     heeded = signal.signal(signal.SIGINT, signal.default_int_handler)
     try:
         process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)

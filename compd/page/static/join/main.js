@@ -1,4 +1,4 @@
-// The join wizard: `compd join` with the mouse.
+// The join wizard: `compd recording join` with the mouse.
 import { KeptExports } from "./kept_exports.js";
 import { LogReading } from "./log_reading.js";
 import { Putting } from "./putting.js";

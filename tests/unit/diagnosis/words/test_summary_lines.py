@@ -37,7 +37,7 @@ Explains: 99 % of the squared error above noise: 0.96 -> 0.18 um, rows left out
 Left:     0.18 um; noise 0.16 um (repeats): only noise is left
 Sure:     a = 1.113 +- 0.021 ppm/K; noise alone does this 1 time in 1000
 Or else:  no other effect that was tried does as well
-Next:     add it: compd effect add link_expansion --recording monday.csv --model
+Next:     add it: compd model add link_expansion --recording monday.csv --model
           FILE; try it on another day's recording: compd compare OTHER.csv
           --model FILE
 """,
@@ -51,7 +51,7 @@ Left:     0.16 um; noise 0.15 um (repeats): only noise is left
 Sure:     link_elasticity k = 27.97 +- 0.29 N/um; backlash b_1 to b_3 = 0.884,
           1.103, 0.795 (+- 0.020) um; more below
 Or else:  no other effect that was tried does as well
-Next:     add it: compd effect add link_elasticity --recording monday.csv
+Next:     add it: compd model add link_elasticity --recording monday.csv
           --model FILE, then backlash; try it on another day's recording: compd
           compare OTHER.csv --model FILE
 """,
@@ -139,7 +139,7 @@ Left:     0.90 um; noise 0.50 um (repeats): some of it goes with the change
 Sure:     b = 3.10 +- 0.10 um; noise alone does this 1 time in 1000
 Or else:  no other effect that was tried does as well
 Next:     find out what changed from 6000 s on (row 62); diagnose the rows
-          before and after it apart; what was found may be added (compd effect
+          before and after it apart; what was found may be added (compd model
           add): it lowers the error, the rest stays
 """,
     nothing_missing: """

@@ -251,7 +251,7 @@ def test_a_shadow_is_named_by_its_hash_and_nothing_is_read(switch):
 def test_a_name_alone_is_refused_and_says_how_it_is_done(switch, tmp_path):
     secret = tmp_path / "token"
     secret.write_text("s3cr3t")
-    with pytest.raises(ProtocolError, match=r"sends? an open descriptor.*compd adopt") as caught:
+    with pytest.raises(ProtocolError, match=r"sends? an open descriptor.*compd model adopt") as caught:
         switch.start(ModelWish(str(secret)), None)
     assert "s3cr3t" not in caught.value.text
     assert switch.control.model_request.read() is None

@@ -1,4 +1,4 @@
-"""The join wizard's routes without a browser: the same files as `compd join`, and refusals in words."""
+"""The join wizard's routes without a browser: the same files as `compd recording join`, and refusals in words."""
 
 from __future__ import annotations
 

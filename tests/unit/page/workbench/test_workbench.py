@@ -1,4 +1,4 @@
-"""A recording in the page: numbers as of `compd compare`, trials that are exact, steps as of `compd effect`."""
+"""A recording in the page: numbers as of `compd compare`, trials that are exact, steps as of `compd model`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`compd tracker`: write the export of the simulated machine's laser tracker, and check the daemon's tip against it."""
+"""`compd sim tracker`: write the export of the simulated laser tracker, and check the daemon's tip against it."""
 
 from __future__ import annotations
 
@@ -31,8 +31,8 @@ _REST_S = 0.5
 
 
 def tracker(
-    simulation: Annotated[Path, typer.Argument(help="The directory that `compd simulate` runs in."), PathKind.FOLDER],
-    out: Annotated[Path, typer.Option(help="The export, for `compd join`.")],
+    simulation: Annotated[Path, typer.Argument(help="The directory that `compd sim run` runs in."), PathKind.FOLDER],
+    out: Annotated[Path, typer.Option(help="The export, for `compd recording join`.")],
     seconds: Annotated[
         float | None, typer.Option(min=1, help="End after this many seconds; default: at Ctrl-C.")
     ] = None,
@@ -57,7 +57,7 @@ def tracker(
 ) -> None:
     """Let the simulated laser tracker measure the tip, and print the distance of the daemon's tip from it at rest.
 
-    Its clock begins at 0, as a real one's does: `compd join` finds the offset from the motion.
+    Its clock begins at 0, as a real one's does: `compd recording join` finds the offset from the motion.
     """
     from datetime import datetime
 
@@ -82,7 +82,7 @@ def tracker(
     write_files({out: written.write(samples)})
     typer.echo(f"{len(looks)} looks in {looks.seconds:.0f} s" + (f", {len(samples.values)} points" if points else ""))
     if hint := _for_join(written, link, points, unit, rate_hz):
-        typer.echo(f"the file does not say it, so give `compd join`: {hint}")
+        typer.echo(f"the file does not say it, so give `compd recording join`: {hint}")
     if compared:
         typer.echo(compared)
 
@@ -151,7 +151,7 @@ def _look(simulation: Path, out: Path, looks: Looks, seconds: float | None, rate
 
 
 def _for_join(written: WrittenForm, link: int | None, points: bool, unit: str, rate_hz: float) -> str:
-    """Options without which `compd join` asks, because the file says nothing of it."""
+    """Options without which `compd recording join` asks, because the file says nothing of it."""
     given = [
         f"--unit {unit}" if not written.says_unit else "",
         f"--rate-hz {rate_hz:g}" if not written.says_rate and not points else "",

@@ -1,4 +1,4 @@
-"""`compd poll`: poll an unresponsive gauge at once."""
+"""`compd gauge poll`: poll an unresponsive gauge at once."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
-from compd.cli.options import DEFAULT_SOCKET, DaemonOption, unix_address
+from compd.cli.options import DEFAULT_SOCKET, DaemonOption, daemon_address
 
 _TIMEOUT_S = 15.0
 _LOOK_EVERY_S = 0.1
@@ -22,7 +22,7 @@ def poll(
     from compd.clock import MonotonicClock
 
     clock, never = MonotonicClock(), threading.Event()
-    with connect(unix_address(daemon), _TIMEOUT_S) as client:
+    with connect(daemon_address(daemon), _TIMEOUT_S) as client:
         before = gauge_status(client.status(), gauge)
         client.poll(gauge)
         end_s = clock.monotonic() + _TIMEOUT_S

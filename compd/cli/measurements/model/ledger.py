@@ -1,4 +1,4 @@
-"""`compd ledger`: every step that changed a model, and the falling error."""
+"""`compd model ledger`: every step that changed a model, and the falling error."""
 
 from __future__ import annotations
 
@@ -7,17 +7,17 @@ from typing import Annotated
 
 import typer
 
-from compd.cli.options import OverwriteOption
+from compd.cli.option_groups import PageOptions, with_groups
 
 _BAR_WIDTH = 16
 # Width of a cell's frame: two spaces and a line.
 _CELL_FRAME = 3
 
 
+@with_groups
 def ledger(
     model: Annotated[Path, typer.Argument(metavar="MODEL", help="The model file.")],
-    html: Annotated[Path | None, typer.Option("--html", help="Write a page with the falling error.")] = None,
-    overwrite: OverwriteOption = False,
+    page: PageOptions = PageOptions(),
 ) -> None:
     """Print every step of a model: the change, its recording, the error before and after."""
     from rich.console import Console
@@ -30,7 +30,7 @@ def ledger(
     steps = stored.steps
     console = Console(highlight=False)
     if not steps:
-        console.print(f"{model}: no step yet; `compd effect add` makes the first")
+        console.print(f"{model}: no step yet; `compd model add` makes the first")
         return
     units = {step.unit for step in steps}
     shown = [k for k, name in enumerate(LEDGER_HEAD) if name != "unit" or len(units) > 1]
@@ -47,9 +47,9 @@ def ledger(
     for cells in zip(*columns, strict=True):
         table.add_row(*cells)
     console.print(keep_words_whole(table, console.width))
-    if html is not None:
-        from compd.report import check_page_path, write_ledger_page
+    if page.html is not None:
+        from compd.report import write_ledger_page
 
-        check_page_path(html, overwrite)
-        write_ledger_page(html, stored)
-        typer.echo(f"The falling error as a picture: {html}")
+        page.check()
+        write_ledger_page(page.html, stored)
+        typer.echo(f"The falling error as a picture: {page.html}")

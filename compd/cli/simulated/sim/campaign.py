@@ -1,4 +1,4 @@
-"""`compd campaign`: simulate the recording of a measuring campaign."""
+"""`compd sim campaign`: simulate the recording of a measuring campaign."""
 
 from __future__ import annotations
 

@@ -1,14 +1,15 @@
-"""`compd effect`: the library of physical causes, and stepwise changes of a model file."""
+"""`compd model`: the library of physical causes, and stepwise changes of a model file."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 import typer
 
-from compd.cli.options import EffectsOption, HoldOption, MachineOption, OverwriteOption, RangesOption
+from compd.cli.option_groups import PageOptions, with_groups
+from compd.cli.options import EffectsOption, HoldOption, MachineOption, RangesOption
 from compd.cli.paths import PathKind
 
 if TYPE_CHECKING:
@@ -21,17 +22,23 @@ if TYPE_CHECKING:
     from compd.model_file import Declaration, ModelFile
 
 ModelOption = Annotated[Path, typer.Option("--model", help="The model file; `add` creates a missing one.")]
-RecordingOption = Annotated[
-    Path, typer.Option("--recording", help="The recording for the fit: NAME.csv or NAME.parquet.")
-]
-DryRunOption = Annotated[bool, typer.Option("--dry-run", help="Show the result without writing it.")]
-EFFECT_HELP = "An id from `compd effect list`; FILE.yaml with one effect, or FILE.yaml:ID; FILE.py:NAME."
+EFFECT_HELP = "An id from `compd model effects`; FILE.yaml with one effect, or FILE.yaml:ID; FILE.py:NAME."
 
 
-effect = typer.Typer(no_args_is_help=True, help="List and show physical causes, and add them to a model file.")
+effect = typer.Typer()
 
 
-@effect.command(name="list")
+class StepOptions(NamedTuple):
+    """Options of every step that fits a model to a recording."""
+
+    recording: Annotated[Path, typer.Option("--recording", help="The recording for the fit: NAME.csv or NAME.parquet.")]
+    model: ModelOption
+    machine: MachineOption = None
+    hold: HoldOption = None
+    dry_run: Annotated[bool, typer.Option("--dry-run", help="Show the result without writing it.")] = False
+
+
+@effect.command("effects")
 def list_effects(effects: EffectsOption = None) -> None:
     """List the installed effects, or those of --effects: port, required quantities, description."""
     from rich.console import Console
@@ -47,15 +54,15 @@ def list_effects(effects: EffectsOption = None) -> None:
     Console().print(table)
 
 
-@effect.command()
+@effect.command("effect")
+@with_groups
 def show(
     name: Annotated[str, typer.Argument(metavar="EFFECT", help=EFFECT_HELP), PathKind.NAME_OR_FILE],
     machine: Annotated[
         Path | None, typer.Option("--machine", help="Machine configuration (YAML); default: the shipped tripod.")
     ] = None,
     effects: EffectsOption = None,
-    html: Annotated[Path | None, typer.Option("--html", help="Write a page with the effect's signature.")] = None,
-    overwrite: OverwriteOption = False,
+    page: PageOptions = PageOptions(),
 ) -> None:
     """Show one effect: its physics, its parameters, and with --html its displacement of a machine's tip."""
     from rich.console import Console
@@ -63,72 +70,58 @@ def show(
     from compd.configuration import load_machine
     from compd.model.library import gather_effects, named_effect
 
-    if html is not None:
-        from compd.report import check_page_path
-
-        check_page_path(html, overwrite)
-    shown = named_effect(name, "compd effect show", gather_effects(effects or ()))
+    page.check()
+    shown = named_effect(name, "compd model effect", gather_effects(effects or ()))
     configuration = load_machine(machine or "tripod-cmm")
     # an effect of one's own may belong to another machine than the shipped one
     Console().print(_card(shown, configuration if machine or not shown.declared else None))
-    if html is not None:
+    if page.html is not None:
         from compd.report import write_effect_page
 
-        write_effect_page(html, shown, configuration)
-        typer.echo(f"{shown.id} on {configuration.machine}: {html}")
+        write_effect_page(page.html, shown, configuration)
+        typer.echo(f"{shown.id} on {configuration.machine}: {page.html}")
 
 
 @effect.command()
+@with_groups
 def add(
     name: Annotated[str, typer.Argument(metavar="EFFECT", help=EFFECT_HELP), PathKind.NAME_OR_FILE],
-    recording: RecordingOption,
-    model: ModelOption,
-    machine: MachineOption = None,
+    step: StepOptions,
     effects: EffectsOption = None,
     ranges: RangesOption = None,
-    hold: HoldOption = None,
-    dry_run: DryRunOption = False,
 ) -> None:
     """Add an effect to a model and fit all its effects together."""
     from compd.api import add_effect
 
-    aligned = _open(recording, machine, ranges, hold)
-    before = _read_model(model, aligned) if model.exists() else None
+    aligned = _open(step, ranges or ())
+    before = _read_model(step.model, aligned) if step.model.exists() else None
     changed = add_effect(before, name, aligned, effects=effects or ())
-    _finish(model, before, changed, aligned, f"added {changed.steps[-1].effect}", dry_run)
+    _finish(step, before, changed, aligned, f"added {changed.steps[-1].effect}")
 
 
 @effect.command()
+@with_groups
 def remove(
     name: Annotated[str, typer.Argument(metavar="EFFECT", help="The id of an effect in the model.")],
-    recording: RecordingOption,
-    model: ModelOption,
-    machine: MachineOption = None,
-    hold: HoldOption = None,
-    dry_run: DryRunOption = False,
+    step: StepOptions,
 ) -> None:
     """Take an effect out of a model and fit the others again."""
     from compd.model_changes import remove_effect
 
-    aligned = _open(recording, machine, hold=hold)
-    before = _read_model(model, aligned)
-    _finish(model, before, remove_effect(before, name, aligned), aligned, f"removed {name}", dry_run)
+    aligned = _open(step)
+    before = _read_model(step.model, aligned)
+    _finish(step, before, remove_effect(before, name, aligned), aligned, f"removed {name}")
 
 
 @effect.command()
-def fit(
-    recording: RecordingOption,
-    model: ModelOption,
-    machine: MachineOption = None,
-    hold: HoldOption = None,
-    dry_run: DryRunOption = False,
-) -> None:
+@with_groups
+def fit(step: StepOptions) -> None:
     """Fit all effects of a model again, on another recording."""
     from compd.model_changes import refit_model
 
-    aligned = _open(recording, machine, hold=hold)
-    before = _read_model(model, aligned)
-    _finish(model, before, refit_model(before, aligned), aligned, "fitted again", dry_run)
+    aligned = _open(step)
+    before = _read_model(step.model, aligned)
+    _finish(step, before, refit_model(before, aligned), aligned, "fitted again")
 
 
 @effect.command()
@@ -147,13 +140,11 @@ def _declared_id(declared: Declaration) -> str:
     return declared if isinstance(declared, str) else str(declared["id"])
 
 
-def _open(
-    path: Path, machine: Path | None, ranges: Sequence[str] | None = None, hold: Sequence[str] | None = None
-) -> AlignedRecording:
+def _open(step: StepOptions, ranges: Sequence[str] = ()) -> AlignedRecording:
     """The recording; for one too long for the memory a sample, which is said."""
     from compd.cli.progress import open_shown
 
-    aligned = open_shown(path, machine, ranges or (), hold or ())
+    aligned = open_shown(step.recording, step.machine, ranges, step.hold or ())
     if sample := aligned.recording.sample:
         typer.echo(f"Fitted to {len(sample.row):,} of {sample.rows:,} rows: a sample. Standard errors are those of it.")
     return aligned
@@ -166,7 +157,7 @@ def _read_model(path: Path, aligned: AlignedRecording) -> ModelFile:
 
 
 def _finish(
-    path: Path, model: ModelFile | None, changed: ModelFile, aligned: AlignedRecording, done: str, dry_run: bool
+    step: StepOptions, model: ModelFile | None, changed: ModelFile, aligned: AlignedRecording, done: str
 ) -> None:
     """Write the file, unless it is a dry run, then print the step's result. model : before it, None for a new one."""
     from rich.console import Console
@@ -176,14 +167,14 @@ def _finish(
     from compd.display_unit import format_error
     from compd.report import keep_words_whole
 
-    if dry_run:
+    if step.dry_run:
         done = f"not written: would have {done}"
     else:
-        changed.write(path)
+        changed.write(step.model)
     before, after = compare(aligned, model), compare(aligned, changed)
     console = Console(highlight=False)
     console.print(
-        f"{path}: {done}; residual {format_error(before.rms_um, aligned.unit, 3)} -> "
+        f"{step.model}: {done}; residual {format_error(before.rms_um, aligned.unit, 3)} -> "
         f"{format_error(after.rms_um, aligned.unit, 3)}, floor ratio "
         f"{before.floor_ratio:.3g} -> {after.floor_ratio:.3g}"
     )

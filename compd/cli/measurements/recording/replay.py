@@ -1,4 +1,4 @@
-"""`compd replay`: compute a recorded run again by the live path."""
+"""`compd recording replay`: compute a recorded run again by the live path."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _MAX_CELLS = 5
 
 
 def replay(
-    name: Annotated[Path, typer.Argument(help="NAME of `compd record` (all parts), or one part.")],
+    name: Annotated[Path, typer.Argument(help="NAME of `compd recording start` (all parts), or one part.")],
     machine: Annotated[Path, typer.Option("--machine", help="The daemon's configuration during the recording.")],
     model: Annotated[
         list[Path] | None,

@@ -1,4 +1,4 @@
-"""`compd simulate`: a simulated machine on real ports."""
+"""`compd sim run`: a simulated machine on real ports."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 LOOK_EVERY_S = 0.25
 
 
-def simulate(
+def run(
     config: Annotated[Path, typer.Argument(help="The machine's configuration; it is read, never written.")],
     directory: Annotated[
         Path | None,
@@ -59,11 +59,11 @@ def simulate(
 ) -> None:
     """Run the simulated machine: it moves, warms up, bends, and serves every gauge in its own protocol.
 
-    Without a plan it visits points for ever. With one it visits them once, so that `compd join` finds the clocks,
-    then goes through the plan's rows: sets the load, holds parts and room as planned, comes from the planned side,
-    waits (--speedup takes that much of it away), dwells; then it stands still.
+    Without a plan it visits points for ever. With one it visits them once, so that `compd recording join` finds the
+    clocks, then goes through the plan's rows: sets the load, holds parts and room as planned, comes from the planned
+    side, waits (--speedup takes that much of it away), dwells; then it stands still.
 
-    `compd fault` breaks a line of it. At the end the daemon's configuration, ports, sockets and machine zero are
+    `compd sim fault` breaks a line of it. At the end the daemon's configuration, ports, sockets and machine zero are
     removed; only the sealed answer of --hidden and --effect stays, until the next machine is simulated there.
     """
     import contextlib
@@ -177,14 +177,14 @@ def _lines(simulation: Simulation) -> Table:
 
 
 def _next_commands(simulation: Simulation, daemon: Configuration) -> str:
-    hold_s = simulation.world.zero_hold_s
+    hold_s, socket = simulation.world.zero_hold_s, daemon.sockets.unix.path
     return (
         "The daemon cannot tell it from the real machine. In other terminals:\n"
         f"    compd run {daemon.path}\n"
-        f"    compd zero {daemon.sockets.unix.path}    (it stands at machine zero for the next {hold_s:.0f} s)\n"
-        f"    compd watch {daemon.sockets.unix.path}\n"
-        f"    compd tracker {simulation.directory} --out track.csv    (a laser tracker looks at the tip)\n"
-        f"    compd fault {simulation.directory} LINE FAULT    (breaks a line; without LINE: which, and how)\n"
+        f"    compd zero --daemon {socket}    (it stands at machine zero for the next {hold_s:.0f} s)\n"
+        f"    compd watch --daemon {socket}\n"
+        f"    compd sim tracker {simulation.directory} --out track.csv    (a laser tracker looks at the tip)\n"
+        f"    compd sim fault {simulation.directory} LINE FAULT    (breaks a line; without LINE: which, and how)\n"
         f"Truth and commands: {simulation.directory / 'control.sock'}. Ctrl-C ends, and removes what is there."
     )
 

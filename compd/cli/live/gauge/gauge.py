@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import typer
 
+from compd.cli.option_groups import with_groups
 from compd.cli.options import OverwriteOption
 from compd.cli.paths import PathKind
 
@@ -17,31 +17,47 @@ if TYPE_CHECKING:
     from compd.gauge_tools import GaugeStatistics, GaugeTarget
     from compd.lines import PortArguments
 
-gauge = typer.Typer(no_args_is_help=True, help="List, find, read, watch and describe gauges.")
+gauge = typer.Typer()
 
-TargetArgument = Annotated[
-    str,
-    typer.Argument(help="A driver's name, or a file (.yaml): a machine, or gauges and their lines."),
-    PathKind.NAME_OR_FILE,
-]
-NameArgument = Annotated[str | None, typer.Argument(help="Name of the gauge, for a file of several.")]
-Port = Annotated[
-    str,
-    typer.Option(
-        help="/dev/serial/by-id/..., pyserial URL, host:port, or opc.tcp://host:port, unless a file names the line."
-    ),
-    PathKind.NAME_OR_FILE,
-]
-Baud = Annotated[int | None, typer.Option(help="Bits per second, from the device's manual.")]
-Format = Annotated[
-    str | None, typer.Option("--format", help="Data bits, parity, stop bits: 8N1, 7E2 ..., from the manual.")
-]
-Timeout = Annotated[float, typer.Option("--timeout", min=0.01, help="Wait (s) for the first byte.")]
-LineKeys = Annotated[
-    list[str] | None,
-    typer.Option("--line", help="Another key of the line: echo=true, pause_s=0.02, rts=false, kind=modbus_ascii."),
-]
-Set = Annotated[list[str] | None, typer.Option("--set", help="An option of the driver: heads=9.")]
+
+class TargetOptions(NamedTuple):
+    """One gauge: of a file, or a driver with its options."""
+
+    target: Annotated[
+        str,
+        typer.Argument(help="A driver's name, or a file (.yaml): a machine, or gauges and their lines."),
+        PathKind.NAME_OR_FILE,
+    ]
+    name: Annotated[str | None, typer.Argument(help="Name of the gauge, for a file of several.")] = None
+    assignments: Annotated[list[str] | None, typer.Option("--set", help="An option of the driver: heads=9.")] = None
+
+
+class LineOptions(NamedTuple):
+    """The line of a gauge."""
+
+    port: Annotated[
+        str,
+        typer.Option(
+            help="/dev/serial/by-id/..., pyserial URL, host:port, or opc.tcp://host:port, unless a file names the line."
+        ),
+        PathKind.NAME_OR_FILE,
+    ] = ""
+    baud: Annotated[int | None, typer.Option(help="Bits per second, from the device's manual.")] = None
+    format_: Annotated[
+        str | None, typer.Option("--format", help="Data bits, parity, stop bits: 8N1, 7E2 ..., from the manual.")
+    ] = None
+    timeout_s: Annotated[float, typer.Option("--timeout", min=0.01, help="Wait (s) for the first byte.")] = 1.0
+    line_keys: Annotated[
+        list[str] | None,
+        typer.Option("--line", help="Another key of the line: echo=true, pause_s=0.02, rts=false, kind=modbus_ascii."),
+    ] = None
+
+    @property
+    def arguments(self) -> PortArguments:
+        """As `compd.lines` takes them."""
+        from compd.lines import PortArguments
+
+        return PortArguments(self.port, self.baud, self.format_, self.timeout_s, self.line_keys or ())
 
 
 @gauge.command("list")
@@ -116,23 +132,15 @@ def scan(
 
 
 @gauge.command()
-def read(
-    target: TargetArgument,
-    name: NameArgument = None,
-    port: Port = "",
-    baud: Baud = None,
-    format_: Format = None,
-    timeout_s: Timeout = 1.0,
-    line_keys: LineKeys = None,
-    assignments: Set = None,
-) -> None:
+@with_groups
+def read(one: TargetOptions, line: LineOptions) -> None:
     """Read one gauge once, and show every byte. Exit code 1 if a channel has no value, or one that is stale."""
     from compd.cli.problems import print_problems
     from compd.clock import MonotonicClock
     from compd.gauge import LineFault
     from compd.gauge_tools import aged, option_doubts, read_gauge
 
-    gauge_target = _target(target, name, _port(port, baud, format_, timeout_s, line_keys), assignments)
+    gauge_target = _target(one, line)
     clock = MonotonicClock()
     started_s = clock.monotonic()
 
@@ -154,15 +162,10 @@ def read(
 
 
 @gauge.command()
+@with_groups
 def watch(
-    target: TargetArgument,
-    name: NameArgument = None,
-    port: Port = "",
-    baud: Baud = None,
-    format_: Format = None,
-    timeout_s: Timeout = 1.0,
-    line_keys: LineKeys = None,
-    assignments: Set = None,
+    one: TargetOptions,
+    line: LineOptions = LineOptions(),
     polls: Annotated[int | None, typer.Option(min=1, help="Stop after this many polls; default: at Ctrl-C.")] = None,
 ) -> None:
     """Poll one gauge as fast as its line allows, or listen to it: values, rate, age, noise and faults."""
@@ -172,7 +175,7 @@ def watch(
     from compd.clock import MonotonicClock
     from compd.gauge_tools import GaugeStatistics, aged, poll_gauge
 
-    gauge_target = _target(target, name, _port(port, baud, format_, timeout_s, line_keys), assignments)
+    gauge_target = _target(one, line)
     clock = MonotonicClock()
     statistics = GaugeStatistics(gauge_target.gauge.channels)
     with Live(console=Console(), refresh_per_second=5) as live:
@@ -186,15 +189,12 @@ def watch(
 
 
 @gauge.command()
+@with_groups
 def learn(
     capture: Annotated[
         Path | None, typer.Argument(help='File of lines `> 3F 0D` and `< 2B 31 ...` (hex), or > "?\\r" (text).')
     ] = None,
-    port: Port = "",
-    baud: Baud = None,
-    format_: Format = None,
-    timeout_s: Timeout = 1.0,
-    line_keys: LineKeys = None,
+    line: LineOptions = LineOptions(),
     out: Annotated[str, typer.Option(help=r"Request to send, with escapes: '?\r'; empty for unsolicited data.")] = "",
     replies: Annotated[int, typer.Option(min=3, help="Number of replies to capture live.")] = 6,
     unit: Annotated[
@@ -251,7 +251,7 @@ def learn(
 
     if to is not None:
         check_replaceable(to, (f"{LEARNED_GAUGE}:".encode(),), "a description of a gauge", overwrite)
-    if capture is None and not port:
+    if capture is None and not line.port:
         raise typer.BadParameter("name a capture file, or a --port")
     answers = Answers(
         units=_listed(unit),
@@ -266,7 +266,7 @@ def learn(
         skipped_end=skip_end,
         plain=plain,
     )
-    settings = byte_line_settings(_port(port, baud, format_, timeout_s, line_keys)) if port else None
+    settings = byte_line_settings(line.arguments) if line.port else None
     if capture is not None:
         captured = read_capture(capture)
     elif settings is not None:
@@ -297,22 +297,14 @@ def _between_captures(done: int, wanted: int) -> None:
     typer.echo()
 
 
-def _port(
-    port: str, baud: int | None, form: str | None, timeout_s: float, line_keys: Sequence[str] | None
-) -> PortArguments:
-    from compd.lines import PortArguments
-
-    return PortArguments(port, baud, form, timeout_s, line_keys or ())
-
-
-def _target(target: str, name: str | None, port: PortArguments, assignments: Sequence[str] | None) -> GaugeTarget:
+def _target(one: TargetOptions, line: LineOptions) -> GaugeTarget:
     from compd.gauge_tools import gauge_of_driver, gauge_of_file
 
-    if target.endswith((".yaml", ".yml")):
-        return gauge_of_file(Path(target), name, port)
-    if not port.port:
+    if one.target.endswith((".yaml", ".yml")):
+        return gauge_of_file(Path(one.target), one.name, line.arguments)
+    if not line.port:
         raise typer.BadParameter("a driver needs --port (and --baud, --format); or name a configuration and its gauge")
-    return gauge_of_driver(target, port, assignments or ())
+    return gauge_of_driver(one.target, line.arguments, one.assignments or ())
 
 
 def _reading_text(reading: Reading, unit: str) -> str:

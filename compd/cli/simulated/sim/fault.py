@@ -1,4 +1,4 @@
-"""`compd fault`: break a line of the simulated machine, and mend it."""
+"""`compd sim fault`: break a line of the simulated machine, and mend it."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ NO_FAULT = "none"
 def fault(
     simulation: Annotated[
         Path,
-        typer.Argument(metavar="DIRECTORY", help="The directory that `compd simulate` runs in."),
+        typer.Argument(metavar="DIRECTORY", help="The directory that `compd sim run` runs in."),
         PathKind.FOLDER,
     ],
     line: Annotated[str | None, typer.Argument(help="The line's name in the configuration; default: list all.")] = None,

@@ -1,29 +1,16 @@
-"""`compd join`: a reference instrument's export beside the gauges, by time, order, name or distance."""
+"""`compd recording join`: a reference instrument's export beside the gauges, by time, order, name or distance."""
 
 from __future__ import annotations
 
 from contextlib import ExitStack
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, NamedTuple
 
 import typer
 
-from compd.cli.export_options import (
-    AnglesOption,
-    AngleUnitOption,
-    ClockSetBackOption,
-    ColumnsOption,
-    DateOrder,
-    DatesOption,
-    DecimalOption,
-    GroupOption,
-    RateOption,
-    Shape,
-    ShapeOption,
-    SheetOption,
-    UnitOption,
-)
+from compd.cli.export_options import ExportForm, LogForm, echo_taken
+from compd.cli.option_groups import with_groups
 from compd.cli.options import MachineOption
 
 
@@ -43,6 +30,24 @@ class FrameChoice(StrEnum):
     INSTRUMENT = "instrument"
 
 
+class RoleOptions(NamedTuple):
+    """Names of the export's columns."""
+
+    time: Annotated[str | None, typer.Option(help="The export's time column; default: by its name.")] = None
+    x: Annotated[str | None, typer.Option(help="The export's column of x; default: by its name.")] = None
+    y: Annotated[str | None, typer.Option(help="The export's column of y; default: by its name.")] = None
+    z: Annotated[str | None, typer.Option(help="The export's column of z; default: by its name.")] = None
+    length: Annotated[str | None, typer.Option(help="The export's column of a length; default: by its name.")] = None
+    visit: Annotated[
+        str | None,
+        typer.Option(help="The export's column that tells visits apart: rows with one text in it are repeats."),
+    ] = None
+    reflector: Annotated[
+        str | None, typer.Option(help="The export's column of the reflectors' names; default: by its name.")
+    ] = None
+
+
+@with_groups
 def join(
     gauges: Annotated[
         Path,
@@ -55,24 +60,13 @@ def join(
     out: Annotated[
         Path, typer.Argument(help="The recording to write: NAME.csv or NAME.parquet, and NAME.yaml beside it.")
     ],
-    time: Annotated[str | None, typer.Option(help="The export's time column; default: by its name.")] = None,
-    x: Annotated[str | None, typer.Option(help="The export's column of x; default: by its name.")] = None,
-    y: Annotated[str | None, typer.Option(help="The export's column of y; default: by its name.")] = None,
-    z: Annotated[str | None, typer.Option(help="The export's column of z; default: by its name.")] = None,
-    length: Annotated[str | None, typer.Option(help="The export's column of a length; default: by its name.")] = None,
+    roles: RoleOptions = RoleOptions(),
     link: Annotated[int | None, typer.Option(help="For a length: its link, 1 to 6.")] = None,
     ball: Annotated[
         int | None,
         typer.Option(
             min=1, help="For a length, of a ballbar or a tracer: the fixed ball from which it goes to the tip."
         ),
-    ] = None,
-    visit: Annotated[
-        str | None,
-        typer.Option(help="The export's column that tells visits apart: rows with one text in it are repeats."),
-    ] = None,
-    reflector: Annotated[
-        str | None, typer.Option(help="The export's column of the reflectors' names; default: by its name.")
     ] = None,
     reflector_place: Annotated[
         list[str] | None,
@@ -81,17 +75,7 @@ def join(
             help="Of several reflectors: where one is, from the tip along the axes of {P}, mm. Once for each.",
         ),
     ] = None,
-    shape: ShapeOption = None,
-    columns: ColumnsOption = None,
-    unit: UnitOption = None,
-    angle_unit: AngleUnitOption = None,
-    angles: AnglesOption = None,
-    decimal: DecimalOption = None,
-    dates: DatesOption = None,
-    rate_hz: RateOption = None,
-    clock_set_back: ClockSetBackOption = False,
-    group: GroupOption = None,
-    sheet: SheetOption = None,
+    form: ExportForm = ExportForm(),
     offset: Annotated[
         float | None,
         typer.Option(help="Recording time minus instrument time, in s; default: estimated from the motion."),
@@ -121,23 +105,12 @@ def join(
             "repeated.",
         ),
     ] = None,
-    log_as: Annotated[Shape | None, typer.Option(help="The log's format, as --as of the export.")] = None,
-    log_sheet: Annotated[str | None, typer.Option(help="The log's sheet, if it has several.")] = None,
-    log_decimal: Annotated[str | None, typer.Option(help="The log's decimal mark, if it is ambiguous.")] = None,
-    log_dates: Annotated[DateOrder | None, typer.Option(help="The log's order of dates, if it is ambiguous.")] = None,
-    log_angles: Annotated[
-        str | None,
-        typer.Option(metavar="ORDER", help="What the log's angles are, as --angles of the export."),
-    ] = None,
-    log_clock_set_back: Annotated[
-        bool, typer.Option("--log-clock-set-back", help="The log's times fall by an hour, as summer time ended.")
-    ] = False,
+    log_form: LogForm = LogForm(),
     plan: Annotated[
         Path | None, typer.Option(help="With --by name: the measured plan; its row k is the point P00k.")
     ] = None,
 ) -> None:
     """Join an instrument's export and a recording: on one clock with an estimated offset, or point by point."""
-    from compd.cli.export_options import echo_taken, read_options
     from compd.configuration import load_machine
     from compd.instruments import read_export
     from compd.joining import (
@@ -155,25 +128,7 @@ def join(
     )
     from compd.recording import write_recording
 
-    roles = {"time": time, "x": x, "y": y, "z": z, "length": length, "visit": visit, "reflector": reflector}
-    read_as = read_options(
-        shape, columns, roles, unit, angle_unit, decimal, dates, rate_hz, group, sheet, clock_set_back, angles
-    )
-    log_read = read_options(
-        log_as,
-        None,
-        {},
-        None,
-        None,
-        log_decimal,
-        log_dates,
-        None,
-        None,
-        log_sheet,
-        log_clock_set_back,
-        log_angles,
-        prefix="--log-",
-    )
+    read_as, log_read = form.read_as(roles._asdict()), log_form.read_as
     exported = read_export(export, read_as)
     echo_taken(export, exported.shape, exported.taken, exported.left_out)
     places = reflector_places(reflector_place or ())

@@ -14,23 +14,17 @@ if TYPE_CHECKING:
     from compd.data_fault import DataFault
     from compd.recording import Recording
 
-recording = typer.Typer(
-    no_args_is_help=True, help="Check, change and merge recordings: readings of the machine beside a reference."
-)
+recording = typer.Typer()
 
-
-@recording.callback()
-def _recording() -> None:
-    """Check, change and merge recordings: readings of the machine beside a reference."""
+RecordingArgument = Annotated[
+    Path, typer.Argument(help="The recording, NAME.csv or NAME.parquet, with NAME.yaml beside it.")
+]
 
 
 @recording.command()
 def check(
-    path: Annotated[Path, typer.Argument(help="The recording, NAME.csv or NAME.parquet, with NAME.yaml beside it.")],
-    machine: Annotated[
-        Path | None,
-        typer.Option("--machine", help="The machine's configuration; a shipped one is found by its name."),
-    ] = None,
+    path: RecordingArgument,
+    machine: MachineOption = None,
 ) -> None:
     """Check a recording; report every problem at once, with file, row, column, value, what is allowed, next step."""
     from compd.comparison import read_with_machine
@@ -90,7 +84,7 @@ def convert(
         Path,
         typer.Argument(
             help="The recording, NAME.csv or NAME.parquet, with NAME.yaml beside it; or NAME.arrow, left by a "
-            "`compd record` that was killed."
+            "`compd recording start` that was killed."
         ),
     ],
     destination: Annotated[Path, typer.Argument(help="What to write: NAME.parquet or NAME.csv.")],
@@ -112,7 +106,7 @@ RowsOption = Annotated[
 
 @recording.command()
 def exclude(
-    path: Annotated[Path, typer.Argument(help="The recording, NAME.csv or NAME.parquet, with NAME.yaml beside it.")],
+    path: RecordingArgument,
     rows: RowsOption,
     reason: Annotated[str, typer.Option(help="Reason, kept in NAME.yaml.")],
 ) -> None:
@@ -126,7 +120,7 @@ def exclude(
 
 @recording.command()
 def include(
-    path: Annotated[Path, typer.Argument(help="The recording, NAME.csv or NAME.parquet, with NAME.yaml beside it.")],
+    path: RecordingArgument,
     rows: RowsOption,
 ) -> None:
     """Let rows count again after leaving them out."""
@@ -192,7 +186,7 @@ def _sessions(contents: Recording) -> str:
 def _reference(contents: Recording) -> str:
     reference = contents.reference
     if reference is None:
-        return "none yet; put an instrument's export beside it with `compd join`"
+        return "none yet; put an instrument's export beside it with `compd recording join`"
     parts = [reference.quantity, ", ".join(contents.reference_columns)]
     if reference.of_fixed_places:
         parts.append("fixed places are fitted along")

@@ -5,22 +5,52 @@ from __future__ import annotations
 from dataclasses import replace
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated, Literal, TypeAlias
+from typing import Annotated, Literal, NamedTuple, TypeAlias
 
 import typer
 
+from compd.cli.option_groups import with_groups
 from compd.cli.options import OverwriteOption
 
-machine = typer.Typer(
-    no_args_is_help=True,
-    help="Begin the configuration of a machine, draw one, and write its numbers for other programs.",
-)
+machine = typer.Typer()
 
 Kind: TypeAlias = Literal["6-ups", "6-pus", "6-rus", "3-spr", "3-rps", "3-prs", "linear-delta", "rotary-delta"]
 Tolerance: TypeAlias = Literal["ground", "measured", "machined", "printed", "hand-built"]
 
 
+class DimensionOptions(NamedTuple):
+    """Dimensions of a machine, by the names of `compd.machine_kinds`."""
+
+    base_radius_mm: Annotated[
+        float | None, typer.Option("--base-radius", help="Of the circle of the base joints, mm.")
+    ] = None
+    platform_radius_mm: Annotated[
+        float | None, typer.Option("--platform-radius", help="Of the circle of the platform joints, mm.")
+    ] = None
+    height_mm: Annotated[
+        float | None,
+        typer.Option(
+            "--height",
+            help="Of the platform joints above the base joints at machine zero, mm; negative where the platform hangs.",
+        ),
+    ] = None
+    base_angle_deg: Annotated[
+        float | None,
+        typer.Option("--base-angle", help="Six legs: between the two base joints of a pair, degrees."),
+    ] = None
+    platform_angle_deg: Annotated[
+        float | None,
+        typer.Option("--platform-angle", help="Six legs: between the two platform joints of a pair, degrees."),
+    ] = None
+    spacing_mm: Annotated[
+        float | None, typer.Option("--spacing", help="Deltas: between the two rods of an arm, mm.")
+    ] = None
+    crank_mm: Annotated[float | None, typer.Option("--crank", help="6-rus, rotary-delta: of a crank, mm.")] = None
+    tool_mm: Annotated[float | None, typer.Option("--tool", help="Of the tip beyond the platform joints, mm.")] = None
+
+
 @machine.command()
+@with_groups
 def new(
     kind: Annotated[
         Kind,
@@ -33,32 +63,7 @@ def new(
     ],
     out: Annotated[Path | None, typer.Option("--out", help="Write the file; left out, the text is printed.")] = None,
     name: Annotated[str | None, typer.Option("--name", help="Of the machine; left out, that of the file.")] = None,
-    base_radius_mm: Annotated[
-        float | None, typer.Option("--base-radius", help="Of the circle of the base joints, mm.")
-    ] = None,
-    platform_radius_mm: Annotated[
-        float | None, typer.Option("--platform-radius", help="Of the circle of the platform joints, mm.")
-    ] = None,
-    height_mm: Annotated[
-        float | None,
-        typer.Option(
-            "--height",
-            help="Of the platform joints above the base joints at machine zero, mm; negative where the platform hangs.",
-        ),
-    ] = None,
-    base_angle_deg: Annotated[
-        float | None,
-        typer.Option("--base-angle", help="Six legs: between the two base joints of a pair, degrees."),
-    ] = None,
-    platform_angle_deg: Annotated[
-        float | None,
-        typer.Option("--platform-angle", help="Six legs: between the two platform joints of a pair, degrees."),
-    ] = None,
-    spacing_mm: Annotated[
-        float | None, typer.Option("--spacing", help="Deltas: between the two rods of an arm, mm.")
-    ] = None,
-    crank_mm: Annotated[float | None, typer.Option("--crank", help="6-rus, rotary-delta: of a crank, mm.")] = None,
-    tool_mm: Annotated[float | None, typer.Option("--tool", help="Of the tip beyond the platform joints, mm.")] = None,
+    given: DimensionOptions = DimensionOptions(),
     tolerance: Annotated[
         Tolerance,
         typer.Option("--tolerance", help="How the machine is made: what is plausible of its geometry follows."),
@@ -71,17 +76,8 @@ def new(
     """
     from compd.machine_kinds import KINDS, machine_text
 
-    given = {
-        "base_radius_mm": base_radius_mm,
-        "platform_radius_mm": platform_radius_mm,
-        "height_mm": height_mm,
-        "base_angle_deg": base_angle_deg,
-        "platform_angle_deg": platform_angle_deg,
-        "spacing_mm": spacing_mm,
-        "crank_mm": crank_mm,
-        "tool_mm": tool_mm,
-    }
-    dimensions = KINDS[kind].usual._replace(**{key: value for key, value in given.items() if value is not None})
+    stated = {key: value for key, value in given._asdict().items() if value is not None}
+    dimensions = KINDS[kind].usual._replace(**stated)
     own_name = name or (out.stem if out is not None else kind)
     text = machine_text(own_name, kind, dimensions, tolerance)
     if out is None:

@@ -1,4 +1,4 @@
-"""`compd record`: record raw readings of the running daemon."""
+"""`compd recording start`: record raw readings of the running daemon."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from compd.cli.options import DEFAULT_SOCKET, DaemonOption, addressed_configuration
+from compd.cli.options import DEFAULT_SOCKET, DaemonOption, daemon_configuration
 from compd.tables import TableFormat
 
 _MB = 1_000_000
@@ -25,14 +25,14 @@ class WhenFull(StrEnum):
     DROP_OLDEST = "drop-oldest"
 
 
-def record(
+def start(
     name: Annotated[
         Path,
         typer.Argument(
             help="Name of the files: NAME becomes NAME-0001.csv ..., with --format parquet NAME-0001.parquet."
         ),
     ],
-    address: DaemonOption = DEFAULT_SOCKET,
+    daemon: DaemonOption = DEFAULT_SOCKET,
     rate_hz: Annotated[float, typer.Option(min=0.001, help="Rows per second; the cycles between are left out.")] = 10.0,
     burst: Annotated[
         float | None, typer.Option(min=0.001, help="Record every cycle for this many seconds; other recorders may run.")
@@ -53,7 +53,7 @@ def record(
         typer.Option(
             "--format",
             help="Format of the table. A part of Parquet is NAME-0001.arrow until it is closed; an interrupted one is "
-            "closed by the next `compd record` of the name, or by `compd recording convert`.",
+            "closed by the next `compd recording start` of the name, or by `compd recording convert`.",
         ),
     ] = TableFormat.CSV,
 ) -> None:
@@ -72,8 +72,8 @@ def record(
     )
     for_s = burst if burst is not None else seconds
     signal.signal(signal.SIGTERM, signal.default_int_handler)
-    clock, configuration = MonotonicClock(), addressed_configuration(address)
-    socket_path = address if configuration is None else configuration.sockets.unix.path
+    clock, configuration = MonotonicClock(), daemon_configuration(daemon)
+    socket_path = daemon if configuration is None else configuration.sockets.unix.path
     with ElapsedShown(for_s, clock) as shown:
         feed = ReadingsFeed(
             lambda: connect(socket_path, max(_TIMEOUT_S, 3 / rate_hz)),

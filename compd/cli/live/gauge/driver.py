@@ -1,4 +1,4 @@
-"""`compd driver test`: check that a driver never delivers a wrong number."""
+"""`compd gauge test-driver`: check that a driver never delivers a wrong number."""
 
 from __future__ import annotations
 
@@ -12,15 +12,10 @@ from compd.cli.paths import PathKind
 if TYPE_CHECKING:
     from compd.conformance import CaseResult, DriverUnderTest
 
-driver = typer.Typer(no_args_is_help=True, help="Try gauge drivers.")
+driver = typer.Typer()
 
 
-@driver.callback()
-def _drivers() -> None:
-    """Try gauge drivers."""
-
-
-@driver.command("test")
+@driver.command("test-driver")
 def try_on_wires(
     name: Annotated[
         str | None,

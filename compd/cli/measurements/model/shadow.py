@@ -1,8 +1,8 @@
-"""`compd shadow`: compute a second model in parallel to the running daemon's own."""
+"""`compd model shadow`: compute a second model in parallel to the running daemon's own."""
 
 from __future__ import annotations
 
-from compd.cli.live.adopt import FileArgument, NoneOption, ask_daemon
+from compd.cli.measurements.model.adopt import FileArgument, NoneOption, ask_daemon
 from compd.cli.options import DEFAULT_SOCKET, DaemonOption
 
 

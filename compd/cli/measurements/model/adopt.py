@@ -1,4 +1,4 @@
-"""`compd adopt`: load a model file into the running daemon."""
+"""`compd model adopt`: load a model file into the running daemon."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import Annotated, Any
 
 import typer
 
-from compd.cli.options import DEFAULT_SOCKET, DaemonOption, unix_address
+from compd.cli.options import DEFAULT_SOCKET, DaemonOption, daemon_address
 
 # Timeout (s) of the answer: reading a model file takes a second, and an effect of one's own may import any library.
 _TIMEOUT_S = 30.0
@@ -34,7 +34,7 @@ def ask_daemon(file: Path | None, daemon: str, none: bool, shadow: bool) -> dict
     if none and file is not None:
         raise typer.BadParameter("name a model file, or --none")
     wanted = "" if none else file
-    with connect(unix_address(daemon), _TIMEOUT_S) as client:
+    with connect(daemon_address(daemon), _TIMEOUT_S) as client:
         try:
             answer = client.model(wanted, shadow)
         except DaemonError as error:

@@ -1,0 +1,1 @@
+"""List, find, read, watch, poll and describe gauges, and try their drivers."""

@@ -1,0 +1,1 @@
+"""List physical causes, add them to a model file, and take the file into the running daemon."""
