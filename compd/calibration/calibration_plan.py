@@ -25,7 +25,6 @@ from compd.calibration.pose_design import Information, Observability, exchange, 
 from compd.errors import CompdError
 from compd.model import MachineModel
 from compd.model.effects import Observations
-from compd.parameter_ranges import StatedRange
 from compd.plan_file import TURN_COLUMNS, plan_row, write_text_file
 from compd.planning import DWELL_S, PlanFormat, rows_text
 from compd.units import UM_PER_MM
@@ -116,7 +115,6 @@ class PoseStudy:
         noise: Noise,
         stroke_mm: tuple[float, float] | None = None,
         box: Box | None = None,
-        ranges: Sequence[StatedRange] = (),
         before: Observations | None = None,
     ) -> None:
         """stroke_mm : shortest and longest length of an extending link.  box : None for what the machine reaches.
@@ -125,7 +123,7 @@ class PoseStudy:
         self.box = reachable_box(model, stroke_mm) if box is None else box
         self._measured, self._noise = measured, noise
         self.candidates = reachable(model, candidate_poses(model, self.box, CANDIDATES), stroke_mm)
-        self._parameters = calibration_parameters(model, self.candidates.rows, ranges)
+        self._parameters = calibration_parameters(model, self.candidates.rows)
         judged = reachable(model, even_poses(model, self.box, _JUDGED, _JUDGED_SEED), stroke_mm).rows
         zero_M_mm = model.zero.contact.tip_M_mm
         moved = pose_columns(model, judged, self._parameters)[:, :3]

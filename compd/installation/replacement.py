@@ -84,7 +84,7 @@ def upgrade(socket: str, program: Path, clock: Clock | None = None) -> Replaceme
     return _exchange(socket, new, clock)
 
 
-def go_back(socket: str, clock: Clock | None = None) -> Replacement:
+def go_back(socket: str) -> Replacement:
     """Exchange the release that runs with the one before it, which doing it again takes back.
 
     Raises
@@ -103,7 +103,7 @@ def go_back(socket: str, clock: Clock | None = None) -> Replacement:
         *_restart_problems(socket),
     ]:
         raise CompdError(problems)
-    return _exchange(socket, {unit: _before(unit).read_text("utf-8") for unit in units}, clock or MonotonicClock())
+    return _exchange(socket, {unit: _before(unit).read_text("utf-8") for unit in units}, MonotonicClock())
 
 
 def _restart_problems(socket: str) -> list[Problem]:

@@ -104,9 +104,9 @@ def read_machine_log(log: Path | NumberColumns, options: LogOptions = LogOptions
         raise RecordingError(problems_of_log(error.problems)) from error
 
 
-def column_roles(table: NumberColumns, named: Sequence[str] = ()) -> list[str]:
-    """What each column is in a recording, "NAME" or "NAME:UNIT"; "-" for nothing. named : as of `LogOptions`."""
-    wanted = _wanted(table.anew(), named)
+def column_roles(table: NumberColumns) -> list[str]:
+    """What each column is in a recording, "NAME" or "NAME:UNIT"; "-" for nothing."""
+    wanted = _wanted(table.anew(), ())
     targets = (wanted.get(k, ("-", "")) for k in range(len(table.header)))
     return [f"{name}:{unit}" if unit else name for name, unit in targets]
 

@@ -80,18 +80,13 @@ class Daemon:
     period_s : of the loop.
     """
 
-    def __init__(
-        self,
-        configuration: Configuration,
-        before: Daemon | None = None,
-        clock: Clock | None = None,
-    ) -> None:
+    def __init__(self, configuration: Configuration, before: Daemon | None = None) -> None:
         """`before`: the daemon whose place this one takes, and whose sockets it goes on with.
 
         Raises CompdError for whatever cannot be had: a socket, the model file, a geometry that is impossible. Nothing
         of `before` has changed then.
         """
-        clock = clock or MonotonicClock()
+        clock = MonotonicClock()
         self.configuration = configuration
         gauges = configuration.gauge_objects()
         own_time = Histogram()

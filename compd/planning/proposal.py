@@ -74,7 +74,6 @@ def next_measurement(
     found: FittedEffect,
     rival: Effect,
     sigma_um: FloatArray,
-    rows: int | None = None,
     constants: ConstantValues | None = None,
     criteria: PlanningCriteria = PlanningCriteria(),
 ) -> NextMeasurement:
@@ -96,9 +95,7 @@ def next_measurement(
     planner = MeasurementPlanner(aligned, model, sigma_um, possible, criteria=criteria)
     first = planner.contender(found)
     second = planner.imitation(first, rival, constants)
-    return _rows_or_words(
-        planner.plan([(first, second), (second, first)], rows or criteria.rows, _words(effects)), effects
-    )
+    return _rows_or_words(planner.plan([(first, second), (second, first)], criteria.rows, _words(effects)), effects)
 
 
 def measurement_of_constant(
@@ -107,7 +104,6 @@ def measurement_of_constant(
     causes: Sequence[Effect],
     constant_um: FloatArray,
     sigma_um: FloatArray,
-    rows: int | None = None,
     criteria: PlanningCriteria = PlanningCriteria(),
 ) -> NextMeasurement:
     """What parts the possible causes of a constant: rows on which they are none or another one, or words.
@@ -121,14 +117,13 @@ def measurement_of_constant(
     except CompdError as error:
         return _words_alone(causes, error)
     planner = MeasurementPlanner(aligned, model, sigma_um, possible, with_nuisance=False, criteria=criteria)
-    count = rows or criteria.rows
     constant = planner.constant(constant_um)
     contenders = [constant, *(planner.imitation(constant, cause) for cause in causes)]
-    contests = [pair for pair in permutations(contenders, 2) if planner.plan([pair], count).tells_apart]
+    contests = [pair for pair in permutations(contenders, 2) if planner.plan([pair], criteria.rows).tells_apart]
     if not contests:
         why = "on all of them these remain one constant, but for less than the noise"
         return NextMeasurement(_ids(causes), None, _words(causes), why)
-    return _rows_or_words(planner.plan(contests, count, _words(causes)), causes)
+    return _rows_or_words(planner.plan(contests, criteria.rows, _words(causes)), causes)
 
 
 def measurement_to_test(
@@ -136,7 +131,6 @@ def measurement_to_test(
     model: Sequence[FittedEffect],
     effect: Effect,
     sigma_um: FloatArray,
-    rows: int | None = None,
     criteria: PlanningCriteria = PlanningCriteria(),
 ) -> NextMeasurement:
     """What makes an effect testable that is not on this recording.
@@ -161,7 +155,7 @@ def measurement_to_test(
     plans = [
         planner.plan(
             [(planner.contender(FittedEffect(effect, np.array(sizes), constants)), None)],
-            rows or criteria.rows,
+            criteria.rows,
             effect.separated_by,
         )
         for constants in effect.constant_grid(aligned.rows)

@@ -47,14 +47,11 @@ def normal_inverse(A: FloatArray, rank_cut: float = RANK_CUT) -> FloatArray:
     return np.asarray(_scaled_inverse(scaled, rank_cut) / np.outer(norms, norms))
 
 
-def solve_least_squares(
-    A: FloatArray, y: FloatArray, weights: FloatArray | None = None, rank_cut: float = RANK_CUT
-) -> FloatArray:
+def solve_least_squares(A: FloatArray, y: FloatArray, weights: FloatArray | None = None) -> FloatArray:
     """(P,) or (P, K) parameters theta that minimise sum_i w_i (y_i - A_i theta)^2.
 
     A : (n, P).  y : (n,), or (n, K) for K right-hand sides at once.  weights : (n,) w_i, 1 if None.
-    rank_cut : as in `normal_inverse`. Of all solutions that fit equally well, the one with the smallest scaled
-    parameters.
+    Of all solutions that fit equally well, the one with the smallest scaled parameters.
     """
     if weights is not None:
         root = np.sqrt(weights)
@@ -62,7 +59,7 @@ def solve_least_squares(
         y = (y.T * root).T
     norms = column_norms(A)
     scaled = A / norms
-    return np.asarray(((_scaled_inverse(scaled, rank_cut) @ (scaled.T @ y)).T / norms).T)
+    return np.asarray(((_scaled_inverse(scaled, RANK_CUT) @ (scaled.T @ y)).T / norms).T)
 
 
 def determined(A: FloatArray, rank_cut: float = RANK_CUT) -> BoolArray:
@@ -84,17 +81,17 @@ def normal_norms(normal: FloatArray) -> FloatArray:
     return np.asarray(np.where(norms > 0, norms, 1.0))
 
 
-def solve_normal(normal: FloatArray, right: FloatArray, rank_cut: float = RANK_CUT) -> FloatArray:
+def solve_normal(normal: FloatArray, right: FloatArray) -> FloatArray:
     """(P,) or (P, K) what `solve_least_squares` gives, from A^T W A (P, P) and A^T W y."""
     norms = normal_norms(normal)
-    inverse = np.linalg.pinv(normal / np.outer(norms, norms), rcond=rank_cut**2, hermitian=True)
+    inverse = np.linalg.pinv(normal / np.outer(norms, norms), rcond=RANK_CUT**2, hermitian=True)
     return np.asarray(((inverse @ (right.T / norms).T).T / norms).T)
 
 
-def determined_by_normal(normal: FloatArray, rank_cut: float = RANK_CUT) -> BoolArray:
+def determined_by_normal(normal: FloatArray) -> BoolArray:
     """(P,) as `determined`, from A^T A (P, P)."""
     norms = normal_norms(normal)
-    return np.asarray((np.diag(normal) > 0) & _in_no_combination(normal / np.outer(norms, norms), rank_cut))
+    return np.asarray((np.diag(normal) > 0) & _in_no_combination(normal / np.outer(norms, norms), RANK_CUT))
 
 
 def solve_ridge(normal: FloatArray, right: FloatArray, ridge: FloatArray) -> FloatArray:

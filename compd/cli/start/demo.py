@@ -26,7 +26,7 @@ def demo(
     port: Annotated[
         int, typer.Option(min=0, max=65535, help="With --live: TCP port of the page; 0: any free port.")
     ] = 7760,
-    linuxcnc: Annotated[bool, typer.Option("--linuxcnc", hidden=True)] = False,
+    linuxcnc: Annotated[bool, typer.Option("--linuxcnc", help="Now a script: examples/linuxcnc/run.py.")] = False,
 ) -> None:
     """Run a simulated machine, the daemon and a controller; show the gain by compensation."""
     if linuxcnc:

@@ -15,7 +15,6 @@ from compd.diagnosis import (
     CandidateResult,
     Criteria,
     DiagnosisProblem,
-    DiagnosisStep,
     SubsetLosses,
     build_problem,
     candidate_pool,
@@ -87,12 +86,9 @@ class Candidates:
         """The error per coordinate at a loss, um."""
         return self.problem.unit_um * float(np.sqrt(max(loss, 0.0)))
 
-    def ranked(self, steps: Sequence[DiagnosisStep] = ()) -> list[dict[str, Any]]:
-        """Every effect with the reason for its rank, in the order of the error on rows left out.
-
-        steps : what a diagnosis has named.
-        """
-        results = candidate_results(self.problem, self.losses, steps, {})
+    def ranked(self) -> list[dict[str, Any]]:
+        """Every effect with the reason for its rank, in the order of the error on rows left out."""
+        results = candidate_results(self.problem, self.losses, (), {})
         ranking: list[dict[str, Any]] = nan_to_null([self._result(result) for result in results])
         return ranking
 

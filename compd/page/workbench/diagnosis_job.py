@@ -11,7 +11,7 @@ from contextvars import copy_context
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-from compd.clock import Clock, MonotonicClock
+from compd.clock import MonotonicClock
 from compd.diagnosis import ONLY_WHERE_NEEDED, STAGES
 from compd.page.shares import ASKER
 from compd.page.workers.limits import WorkerLimits
@@ -50,14 +50,13 @@ class DiagnosisJob:
         path: Path,
         model_path: Path | None,
         machine: Machine | None,
-        clock: Clock | None = None,
         revision: int = 0,
         effects: Sequence[str] = (),
         workers: Workers | None = None,
     ) -> None:
         """model_path : of a model file that is there; None for no model. effects : files of effects, or names of
         those that come with compd, that are tried beside the library's. workers : of the same server."""
-        self._clock = clock or MonotonicClock()
+        self._clock = MonotonicClock()
         self._start_s = self._clock.monotonic()
         self.id = secrets.token_hex(8)
         self.path, self.revision, self.token = path, revision, ASKER.get()

@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from compd.clock import Clock, MonotonicClock
+from compd.clock import MonotonicClock
 from compd.line_settings import PolledLineSettings
 from compd.lines import polled_definition
 from compd.twins import LATE, UNPLUGGED, End, Port, SimulatedByteDevice, SimulatedRegisterDevice, checked_fault
@@ -43,12 +43,11 @@ class SimulatedLine:
         settings: PolledLineSettings,
         devices: Sequence[SimulatedByteDevice] | Sequence[SimulatedRegisterDevice],
         directory: Path,
-        clock: Clock | None = None,
     ) -> None:
         """directory : where a serial line's port appears, as `name`."""
         self.replies = 0  # number of replies, including those that a fault suppresses
         self._settings = settings
-        self._clock = clock or MonotonicClock()
+        self._clock = MonotonicClock()
         self._link = directory / name
         self._twin = polled_definition(settings).twin
         self._listener = self._twin.listener(settings, devices)

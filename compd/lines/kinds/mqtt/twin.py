@@ -9,7 +9,6 @@ from typing import Any
 from paho.mqtt.client import Client
 from paho.mqtt.enums import CallbackAPIVersion
 
-from compd.clock import Clock
 from compd.errors import CompdError
 from compd.twins import WRONG_TYPE, SimulatedPushedDevice, SimulatedPushedLine
 
@@ -24,15 +23,9 @@ class MqttPublisher(SimulatedPushedLine):
     kind = "mqtt"
     own_faults = (NOT_A_NUMBER,)
 
-    def __init__(
-        self,
-        name: str,
-        devices: Sequence[SimulatedPushedDevice],
-        broker: tuple[str, int] | None,
-        clock: Clock | None = None,
-    ) -> None:
+    def __init__(self, name: str, devices: Sequence[SimulatedPushedDevice], broker: tuple[str, int] | None) -> None:
         """`broker`: host and port. Raises CompdError if there is none."""
-        super().__init__(name, devices, clock)
+        super().__init__(name, devices)
         if broker is None:
             raise CompdError.of(
                 f"lines.{name}",

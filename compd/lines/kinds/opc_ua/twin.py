@@ -15,7 +15,6 @@ from asyncua import ua
 from asyncua.server.server import Server
 from asyncua.ua.status_codes import StatusCodes
 
-from compd.clock import Clock
 from compd.twins import LOOPBACK, WRONG_TYPE, SimulatedPushedDevice, SimulatedPushedLine, is_off
 
 for _name in ("asyncua.server", "asyncua.client"):
@@ -36,8 +35,8 @@ class OpcUaNodes(SimulatedPushedLine):
     kind = "opc_ua"
     own_faults = tuple(STATUSES)
 
-    def __init__(self, name: str, devices: Sequence[SimulatedPushedDevice], clock: Clock | None = None) -> None:
-        super().__init__(name, devices, clock)
+    def __init__(self, name: str, devices: Sequence[SimulatedPushedDevice]) -> None:
+        super().__init__(name, devices)
         with socket.socket() as free:
             free.bind((LOOPBACK, 0))
             self._port: int = free.getsockname()[1]

@@ -118,7 +118,9 @@ def test_an_instruments_frame_is_fitted_along(tmp_path: Path) -> None:
 def test_rivals_get_rows_and_what_they_will_do(tmp_path: Path) -> None:
     aligned = record_with_effects(tmp_path / "run.csv", 1, {"link_elasticity": (1 / 60,)}, visits=60)
     found, _ = fit_rivals(aligned, "link_elasticity", "joint_contact")
-    answer = next_measurement(aligned, (), found, LIBRARY["joint_contact"], SIGMA_UM, rows=20)
+    answer = next_measurement(
+        aligned, (), found, LIBRARY["joint_contact"], SIGMA_UM, criteria=PlanningCriteria(rows=20)
+    )
     assert answer.effects == ("link_elasticity", "joint_contact")
     assert answer.plan is not None
     assert answer.plan.separation >= max(PlanningCriteria.min_separation, answer.plan.before + 1)

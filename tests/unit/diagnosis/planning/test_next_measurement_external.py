@@ -19,7 +19,13 @@ from compd.errors import CompdError
 from compd.model.effects import Effect, FittedEffect
 from compd.model.formula import formula_effect
 from compd.model.library import load_library
-from compd.planning import measurement_of_constant, measurement_to_test, next_measurement, plan_measurement
+from compd.planning import (
+    PlanningCriteria,
+    measurement_of_constant,
+    measurement_to_test,
+    next_measurement,
+    plan_measurement,
+)
 from tests.support.external_recordings import SIGMA_UM, along, record_external
 
 ROWS = 60
@@ -151,7 +157,9 @@ def test_an_effect_that_remembers_is_parted_by_steps_that_are_watched(tmp_path: 
     assert max(row["time_s"] for row in steps) >= 600
     assert "time_s" in plan.instructions
     # where nothing is watched, both are the same
-    still = next_measurement(aligned, (), fitted(aligned, BED), BED_LATER, sigma_um(aligned), rows=4)
+    still = next_measurement(
+        aligned, (), fitted(aligned, BED), BED_LATER, sigma_um(aligned), criteria=PlanningCriteria(rows=4)
+    )
     assert still.plan is None
 
 
