@@ -327,6 +327,5 @@ def _unit_in_comments(file_rows: _Rows, problems: ProblemList) -> str:
             if unit in ("mm", "um", "nm", "cm", "m", "inch", "ft"):
                 units.setdefault(unit, number)
     if len(units) > 1:
-        problems.add(max(units.values()), "comments name two units", ", ".join(units), "one", "give --unit")
-        problems.check()
+        problems.refuse(max(units.values()), "comments name two units", ", ".join(units), "one", "give --unit")
     return next(iter(units), "")
