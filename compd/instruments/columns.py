@@ -49,8 +49,7 @@ def to_export(table: RawTable, options: ReadOptions) -> InstrumentExport:
     """The export that a table holds. Raises RecordingError with everything that is wrong or must be said."""
     problems = ProblemList(table.path)
     if not len(table.line):
-        problems.add(table.header_line, "has no rows", allowed="rows of numbers")
-        problems.check()
+        problems.refuse(table.header_line, "has no rows", allowed="rows of numbers")
     roles = find_roles(table, options, problems)
     problems.check()
     assumptions = {role: f"{column_text(table, k)}, {roles.why[role]}" for role, k in roles.column.items()}
@@ -73,8 +72,7 @@ def to_export(table: RawTable, options: ReadOptions) -> InstrumentExport:
         complete = complete & np.isfinite(time.time_s)
         assumptions["time"] = f"{assumptions['time']}, {time.assumed}" if "time" in assumptions else time.assumed
     if not complete.any():
-        problems.add(int(table.line[0]), "no row is complete", allowed=f"{', '.join(axes)} in each row")
-        problems.check()
+        problems.refuse(int(table.line[0]), "no row is complete", allowed=f"{', '.join(axes)} in each row")
     names = _names(table, roles, assumptions)
     left_out = dict(table.left_out)
     if markers.any():

@@ -13,6 +13,7 @@ from compd.arrays import IntArray
 from compd.instruments.cells import OTHER_CHARACTERS, decimal_mark, is_number, is_number_column, with_points
 from compd.instruments.delimiter import BLANKS, NAMES, WIDE_BLANKS, find_delimiter, split_cells, split_header
 from compd.instruments.export import ReadOptions
+from compd.instruments.header_names import is_unit_row, with_units
 from compd.instruments.raw_table import RawTable
 from compd.instruments.read_limits import ReadLimits
 from compd.instruments.text_file import TextFile
@@ -220,16 +221,14 @@ def _take_header(
     tops = [tuple(cells[i] for cells in columns) for i in range(top)]
     if not tops:
         return _header_above(file_rows, line, delimiter, count, above, problems)
-    units = [i for i in range(1, top) if _is_unit_row(tops[i])]
+    units = [i for i in range(1, top) if is_unit_row(tops[i])]
     named = [i for i in range(top) if i not in units]
     first = max(named, key=lambda i: (sum(map(bool, tops[i])), -i))
     names, last = tops[first], first + 1
     repeats = [names]
     if last in units:
         repeats.append(tops[last])
-        names = tuple(
-            f"{name} [{unit.strip('[](){} ')}]" if unit else name for name, unit in zip(names, tops[last], strict=True)
-        )
+        names = with_units(names, tops[last])
         last += 1
     return _Header(names, int(line[first]), last, above + first, tuple(repeats))
 
@@ -262,12 +261,6 @@ def _header_above(
             file_rows.comments.remove((number, text))
             return _Header(tuple(names), number, 0, above)
     return _Header(None, 0, 0, above)
-
-
-def _is_unit_row(cells: Sequence[str]) -> bool:
-    """Whether each cell is a unit, a dash or empty, and one is a unit."""
-    bare = [cell.strip("[](){} ") for cell in cells]
-    return any(map(unit_named, bare)) and all(not cell or cell in "-1" or unit_named(cell) for cell in bare)
 
 
 def _drop_headers(
@@ -334,6 +327,5 @@ def _unit_in_comments(file_rows: _Rows, problems: ProblemList) -> str:
             if unit in ("mm", "um", "nm", "cm", "m", "inch", "ft"):
                 units.setdefault(unit, number)
     if len(units) > 1:
-        problems.add(max(units.values()), "comments name two units", ", ".join(units), "one", "give --unit")
-        problems.check()
+        problems.refuse(max(units.values()), "comments name two units", ", ".join(units), "one", "give --unit")
     return next(iter(units), "")

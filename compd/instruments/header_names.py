@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
+from itertools import zip_longest
 from typing import NamedTuple
 
 from compd.instruments.axes import ATTITUDE_AXES, POSITION_AXES
-from compd.units import unit_named
+from compd.units import KNOWN_UNITS, unit_named
 
 _PARTS = re.compile(r"[^0-9a-z]+")
 _UNIT_BEHIND = re.compile(r"[\[(<{]\s*([^\[\](){}<>]*?)\s*[\])>}]\s*$")
+_MICRO = str.maketrans({"µ": "u", "μ": "u"})
 _LETTERS = str.maketrans({"ä": "ae", "ö": "oe", "ü": "ue", "ß": "ss", "µ": "u", "μ": "u"})
 
 # Normalised words by the role of their column, in English and German.
@@ -69,6 +72,24 @@ def understand(name: str) -> HeaderName:
 def turn_axis(name: str) -> str:
     """rx, ry or rz of a column named roll, pitch or yaw, in English or German; "" of any other."""
     return _TURNS.get(split_unit(name)[0].rpartition("_")[2], "")
+
+
+def is_unit_row(cells: Sequence[str]) -> bool:
+    """Whether each cell is a unit, a dash or empty, and one is a unit."""
+    units = list(map(_unit_alone, cells))
+    return None not in units and any(units)
+
+
+def with_units(names: Sequence[str], cells: Sequence[str]) -> tuple[str, ...]:
+    """The names with the unit in the cell below each: ("X", "mm") is "X [mm]"."""
+    below = zip_longest(names, map(_unit_alone, cells), fillvalue="")
+    return tuple(f"{name} [{unit}]" if unit else str(name) for name, unit in below)
+
+
+def _unit_alone(cell: str) -> str | None:
+    """The unit in a cell such as "mm" or "[mm]", "" for none; None for anything else."""
+    bare = cell.strip("[](){} ").translate(_MICRO).replace("°C", "degC")
+    return "" if bare in ("", "-", "1") else bare if unit_named(bare) or bare in KNOWN_UNITS else None
 
 
 def is_not_measured(name: str) -> bool:

@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 
 from compd.arrays import FloatArray, IntArray, TextArray
-from compd.errors import RecordingError
 from compd.instruments.cells import is_number_column, numbers
 from compd.instruments.column_roles import Roles, column_text
 from compd.instruments.columns import read_time
@@ -92,7 +91,5 @@ def read_number_columns(path: Path, options: ReadOptions | None = None) -> Numbe
     """
     table = read_table(path, options or ReadOptions())
     if isinstance(table, InstrumentExport):
-        problems = ProblemList(path)
-        problems.add(0, "is no table of columns", allowed="a workbook, or text with a delimiter")
-        raise RecordingError(problems.problems)
+        ProblemList(path).refuse(0, "is no table of columns", allowed="a workbook, or text with a delimiter")
     return NumberColumns.of(table)

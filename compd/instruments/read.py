@@ -44,9 +44,7 @@ def read_table(path: Path, options: ReadOptions) -> RawTable | InstrumentExport:
     """As `read_export`, before it is known which column is what; a file without columns of text is read whole."""
     formats = instrument_formats()
     if options.shape is not None and options.shape not in formats:
-        problems = ProblemList(path)
-        problems.add(0, "--as names no shape", options.shape, ", ".join(formats))
-        raise RecordingError(problems.problems)
+        ProblemList(path).refuse(0, "--as names no shape", options.shape, ", ".join(formats))
     content = read_content(path)
     chosen = binary_format_of(path, content) if options.shape is None else formats[options.shape]
     if isinstance(chosen, BinaryFormat):
@@ -70,9 +68,7 @@ def binary_format_of(path: Path, content: bytes) -> BinaryFormat | None:
             return known
         for magic, outdated in known.outdated.items():
             if content.startswith(magic):
-                problems = ProblemList(path)
-                problems.add(0, outdated.what, next_step=outdated.next_step)
-                raise RecordingError(problems.problems)
+                ProblemList(path).refuse(0, outdated.what, next_step=outdated.next_step)
     return None
 
 

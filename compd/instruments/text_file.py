@@ -40,8 +40,7 @@ def read_content(path: Path) -> bytes:
     try:
         content = read_small_file(path, MAX_BYTES)
     except OSError as error:
-        problems.add(0, f"cannot be read: {error.strerror}", next_step="give the path of the instrument's export")
-        raise RecordingError(problems.problems) from error
+        problems.refuse(0, f"cannot be read: {error.strerror}", next_step="give the path of the instrument's export")
     if not content:
         problems.add(0, "is empty", allowed="rows of numbers")
     problems.check()
@@ -80,8 +79,7 @@ def decode_text(path: Path, content: bytes, limits: ReadLimits) -> TextFile:
         text = text.replace("\r\n", "\n").replace("\r", "\n")
     count = text.count("\n")
     if count > limits.lines:
-        problems.add(0, "has too many lines", str(count), f"{limits.lines}", "split the file, or leave out samples")
-        problems.check()
+        problems.refuse(0, "has too many lines", str(count), f"{limits.lines}", "split the file, or leave out samples")
     lines = text.split("\n")
     _check_length(lines, limits, problems)
     complete = not lines[-1]

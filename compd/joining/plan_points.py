@@ -22,12 +22,10 @@ def read_plan_points(path: Path) -> FloatArray:
         raise RecordingError(problems.problems)
     missing = [name for name in TIP_COLUMNS if name not in table.columns]
     if missing:
-        problems.add("", f"has no column {', '.join(missing)}", allowed=", ".join(TIP_COLUMNS), next_step=WRITTEN_BY)
-        problems.check()
+        problems.refuse("", f"has no column {', '.join(missing)}", allowed=", ".join(TIP_COLUMNS), next_step=WRITTEN_BY)
     places_mm = np.column_stack([table.columns[name] for name in TIP_COLUMNS])
     if problems.problems or not len(places_mm) or not np.isfinite(places_mm).all():
-        problems.add("", "has rows without a place for the tip", next_step=WRITTEN_BY)
-        problems.check()
+        problems.refuse("", "has rows without a place for the tip", next_step=WRITTEN_BY)
     return places_mm
 
 

@@ -57,6 +57,7 @@ from compd.live.service import (
     TargetKeys,
     TcpAccess,
     UdpSender,
+    VersionKeys,
     ZeroCapture,
     machine_message,
 )
@@ -175,16 +176,15 @@ class Daemon:
             last_readings.recall()
         keeping = ModelKeeping(configuration.path, configuration.state.model_file).keys
         model_switch = ModelSwitch(self.control, self.setpoints.wake_reader, clock, keeping)
-        version: dict[str, Any] = {
-            "class": "VERSION",
-            "protocol": PROTOCOL,
-            "release": __version__,
-            "machine": configuration.machine,
-            "config_hash": configuration.config_hash,
-            "links": configuration.geometry.links,
-            "not_measured": not_measured(configuration),
-            "computed_by": dict(kernel_versions()),
-        }
+        version = VersionKeys.message(
+            protocol=PROTOCOL,
+            release=__version__,
+            machine=configuration.machine,
+            config_hash=configuration.config_hash,
+            links=configuration.geometry.links,
+            not_measured=not_measured(configuration),
+            computed_by=kernel_versions(),
+        )
         report = StatusReport(
             version=version,
             latest=self.latest,

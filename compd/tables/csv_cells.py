@@ -22,54 +22,57 @@ _HEADER_WITHIN = 20
 
 
 class CellProblem(NamedTuple):
-    """A kind of wrong cell: the fault, the allowed contents, the next step."""
+    """A kind of wrong cell: the pattern of all of it, the fault, the next step."""
 
+    pattern: str
     what: str
-    allowed: str
     next_step: str
 
 
-_NUMBER_ALLOWED = "a number with a decimal point, or an empty cell where nothing was measured"
-
-DECIMAL_COMMA = CellProblem(
-    "decimal comma", _NUMBER_ALLOWED, "export again with `.` as the decimal mark (a spreadsheet's English locale)"
-)
+NUMBER_ALLOWED = "a number with a decimal point, or an empty cell where nothing was measured"
 AMBIGUOUS_COMMA = CellProblem(
+    r"[+-]?\d{1,3},\d{3}",
     "a comma that may be a decimal or a thousands mark",
-    _NUMBER_ALLOWED,
     "export again with `.` as the decimal mark and no thousands separator",
 )
-_THOUSANDS = CellProblem(
-    "thousands separator", _NUMBER_ALLOWED, "export again with a number format without thousands separator"
+DECIMAL_COMMA = CellProblem(
+    r"[+-]?\d*,\d+(?:e[+-]?\d+)?|[+-]?\d{1,3}(?:\.\d{3})+,\d+",
+    "decimal comma",
+    "export again with `.` as the decimal mark (a spreadsheet's English locale)",
 )
-_SPREADSHEET_ERROR = CellProblem("a spreadsheet's error", _NUMBER_ALLOWED, "mend the formula, or empty the cell")
-_MISSING_WORD = CellProblem("a word or sign for a missing value", _NUMBER_ALLOWED, "empty the cell")
-_NOT_FINITE = CellProblem("not a finite number", _NUMBER_ALLOWED, "empty the cell")
-_DATE = CellProblem(
-    "a date or a time of day",
-    _NUMBER_ALLOWED,
-    "for time_s write seconds from the start, e.g. =(A2-A$2)*86400; elsewhere give the column a number format",
-)
-_UNIT_IN_CELL = CellProblem(
-    "a unit behind the number", _NUMBER_ALLOWED, "write the unit once, at the end of the column's name"
-)
-_MINUS = CellProblem("a typographic minus (U+2212 or a dash)", _NUMBER_ALLOWED, "write the minus of the keyboard, `-`")
-_TEXT = CellProblem("text where a number belongs", _NUMBER_ALLOWED, "write the number, or empty the cell")
-
+_NOT_FINITE = CellProblem(r"[+-]?(?:inf|infinity)", "not a finite number", "empty the cell")
 # The first pattern that matches the whole cell decides.
-_KINDS: tuple[tuple[re.Pattern[str], CellProblem], ...] = tuple(
-    (re.compile(pattern, re.IGNORECASE), problem)
-    for pattern, problem in (
-        (r"#[A-Z0-9/_ ]+[!?]?|#+|err:\d+", _SPREADSHEET_ERROR),
-        (r"[-\u2013\u2014?*/.]+|n\.?\s?[/.]?\s?a\.?|nan|null|none|nil|missing|empty", _MISSING_WORD),
-        (r"[+-]?(?:inf|infinity)", _NOT_FINITE),
-        (r"[\u2212\u2013\u2014]\s*\d.*", _MINUS),
-        (r"\d{1,4}([-/.])\d{1,2}\1\d{1,4}.*|\d{1,3}:\d{2}(?::\d{2}.*)?", _DATE),
-        (r"[+-]?\d{1,3},\d{3}", AMBIGUOUS_COMMA),
-        (r"[+-]?\d*,\d+(?:e[+-]?\d+)?|[+-]?\d{1,3}(?:\.\d{3})+,\d+", DECIMAL_COMMA),
-        (r"[+-]?\d{1,3}(?:[,' \u00a0\u2009\u202f\u2019]\d{3})+(?:[.,]\d*)?|[+-]?\d{1,3}(?:\.\d{3}){2,}", _THOUSANDS),
-        (r"[+-]?\d+(?:[.,]\d+)?\s*[^\d\s.,:/-][^\d]*", _UNIT_IN_CELL),
-    )
+_KINDS = (
+    CellProblem(r"#[A-Z0-9/_ ]+[!?]?|#+|err:\d+", "a spreadsheet's error", "mend the formula, or empty the cell"),
+    CellProblem(
+        r"[-\u2013\u2014?*/.]+|n\.?\s?[/.]?\s?a\.?|nan|null|none|nil|missing|empty",
+        "a word or sign for a missing value",
+        "empty the cell",
+    ),
+    _NOT_FINITE,
+    CellProblem(
+        r"[\u2212\u2013\u2014]\s*\d.*",
+        "a typographic minus (U+2212 or a dash)",
+        "write the minus of the keyboard, `-`",
+    ),
+    CellProblem(
+        r"\d{1,4}([-/.])\d{1,2}\1\d{1,4}.*|\d{1,3}:\d{2}(?::\d{2}.*)?",
+        "a date or a time of day",
+        "for time_s write seconds from the start, e.g. =(A2-A$2)*86400; elsewhere give the column a number format",
+    ),
+    AMBIGUOUS_COMMA,
+    DECIMAL_COMMA,
+    CellProblem(
+        r"[+-]?\d{1,3}(?:[,' \u00a0\u2009\u202f\u2019]\d{3})+(?:[.,]\d*)?|[+-]?\d{1,3}(?:\.\d{3}){2,}",
+        "thousands separator",
+        "export again with a number format without thousands separator",
+    ),
+    CellProblem(
+        r"[+-]?\d+(?:[.,]\d+)?\s*[^\d\s.,:/-][^\d]*",
+        "a unit behind the number",
+        "write the unit once, at the end of the column's name",
+    ),
+    CellProblem(r"(?s:.*)", "text where a number belongs", "write the number, or empty the cell"),
 )
 
 
@@ -77,10 +80,7 @@ def cell_problem(cell: str) -> CellProblem | None:
     """The fault of a stripped, non-empty cell of a number column; None for a finite number."""
     if NUMBER.fullmatch(cell):
         return _NOT_FINITE if abs(float(cell)) == float("inf") else None
-    for pattern, problem in _KINDS:
-        if pattern.fullmatch(cell):
-            return problem
-    return _TEXT
+    return next(kind for kind in _KINDS if re.fullmatch(kind.pattern, cell, re.IGNORECASE))
 
 
 class CsvCells(NamedTuple):

@@ -6,15 +6,17 @@ empty rows and columns at the end. Everything else that a spreadsheet may write 
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
 
-from compd.arrays import FloatArray, IntArray
+from compd.arrays import FloatArray
 from compd.tables.csv_cells import (
     AMBIGUOUS_COMMA,
     DECIMAL_COMMA,
+    NUMBER_ALLOWED,
     CellProblem,
     CsvCells,
     HeaderTest,
@@ -166,7 +168,7 @@ def _read_any(
     columns: dict[str, FloatArray] = {}
     own_labels: dict[str, tuple[str, ...]] = {}
     wrong: set[str] = set()
-    commas = _CommaCells()
+    commas: list[tuple[str, CellProblem, list[int], list[str]]] = []
     cells_by_column = list(zip(*(cells for _, cells in csv_cells.rows), strict=True))
     for name, index in csv_cells.names.items():
         cells = cells_by_column[index] if cells_by_column else ()
@@ -176,10 +178,19 @@ def _read_any(
             values = id_codes(cells, own_labels[name])
         if values is None:
             place = f"column {name} ({column_letters(index)})"
-            values = _checked_numbers(place, cells, row, problems, commas)
+            values, kinds = _checked_numbers(cells)
             wrong.add(name)
+            for kind, indices in kinds.items():
+                of_kind = (row[indices].tolist(), [cells[i] for i in indices])
+                if kind in (DECIMAL_COMMA, AMBIGUOUS_COMMA):
+                    commas.append((place, kind, *of_kind))
+                else:
+                    _report([place], kind, *of_kind, problems)
         columns[name] = values
-    commas.report(problems)
+    if commas:  # a spreadsheet writes them in every column; one that is certain decides what the others are
+        places, kinds_of_comma, rows, texts = zip(*commas, strict=True)
+        kind = DECIMAL_COMMA if DECIMAL_COMMA in kinds_of_comma else AMBIGUOUS_COMMA
+        _report(dict.fromkeys(places), kind, sorted(set(chain(*rows))), chain(*texts), problems)
     letters = {name: column_letters(index) for name, index in csv_cells.names.items()}
     return Table(path, letters, columns, row, own_labels, frozenset(wrong))
 
@@ -201,59 +212,21 @@ def _numbers(cells: Sequence[str]) -> FloatArray | None:
     return None if np.isinf(values).any() else values
 
 
-class _CommaCells:
-    """Cells with a decimal comma. A spreadsheet writes it in every column, so one problem names them all."""
-
-    def __init__(self) -> None:
-        self.places: dict[str, None] = {}
-        self.rows: set[int] = set()
-        self.values: list[str] = []
-        self.problem = AMBIGUOUS_COMMA
-
-    def add(self, place: str, problem: CellProblem, rows: IntArray, values: Sequence[str]) -> None:
-        """Note cells of one column. One certain decimal comma decides what the ambiguous commas are."""
-        self.places[place] = None
-        self.rows.update(rows.tolist())
-        self.values += values
-        if problem is DECIMAL_COMMA:
-            self.problem = problem
-
-    def report(self, problems: ProblemList) -> None:
-        """Add one problem if there is any such cell."""
-        if self.places:
-            problems.add(
-                f"{', '.join(self.places)}, {rows_text(sorted(self.rows))}",
-                self.problem.what,
-                values_text(self.values),
-                self.problem.allowed,
-                self.problem.next_step,
-            )
-
-
-def _checked_numbers(
-    place: str, cells: Sequence[str], row: IntArray, problems: ProblemList, commas: _CommaCells
-) -> FloatArray:
-    """The column's numbers, nan for wrong cells; one problem for each kind of wrong cell."""
+def _checked_numbers(cells: Sequence[str]) -> tuple[FloatArray, dict[CellProblem, list[int]]]:
+    """The column's numbers, nan for wrong cells, and the indices of these by their kind."""
     values = np.full(len(cells), np.nan)
     wrong: dict[CellProblem, list[int]] = {}
     for i, cell in enumerate(cells):
-        if not cell:
-            continue
-        problem = cell_problem(cell)
-        if problem is None:
-            values[i] = float(cell)
-        else:
+        problem = cell_problem(cell) if cell else None
+        if problem is not None:
             wrong.setdefault(problem, []).append(i)
-    for problem, indices in wrong.items():
-        wrong_cells = [cells[i] for i in indices]
-        if problem in (DECIMAL_COMMA, AMBIGUOUS_COMMA):
-            commas.add(place, problem, row[indices], wrong_cells)
-        else:
-            problems.add(
-                f"{place}, {rows_text(row[indices].tolist())}",
-                problem.what,
-                values_text(wrong_cells),
-                problem.allowed,
-                problem.next_step,
-            )
-    return values
+        elif cell:
+            values[i] = float(cell)
+    return values, wrong
+
+
+def _report(
+    places: Iterable[str], kind: CellProblem, rows: Sequence[int], cells: Iterable[str], problems: ProblemList
+) -> None:
+    where = f"{', '.join(places)}, {rows_text(rows)}"
+    problems.add(where, kind.what, values_text(cells), NUMBER_ALLOWED, kind.next_step)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from pathlib import Path
+from typing import NoReturn
 
 from compd.errors import Problem, RecordingError
 
@@ -33,6 +34,11 @@ class ProblemList:
         if isinstance(place, int) and len(value) > _LINE_WIDTH:
             value = value[: _LINE_WIDTH - 3] + "..."
         self.problems.append(Problem(self._where(place), what, value=value, allowed=allowed, next_step=next_step))
+
+    def refuse(self, place: str | int, what: str, value: str = "", allowed: str = "", next_step: str = "") -> NoReturn:
+        """Add a problem, and raise RecordingError with all."""
+        self.add(place, what, value, allowed, next_step)
+        raise RecordingError(self.problems)
 
     def ask(self, what: str, value: str, answers: Sequence[str], line: int = 0) -> None:
         """Add a question: several readings are possible, and each of `answers` settles it."""

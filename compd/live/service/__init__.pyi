@@ -5,6 +5,7 @@ from .last_readings import LastReadings as LastReadings
 from .listeners import Listeners as Listeners
 from .loop_watch import LoopWatch as LoopWatch
 from .machine_reply import machine_message as machine_message
+from .message_keys.message import VersionKeys as VersionKeys
 from .messages import PROTOCOL as PROTOCOL
 from .model_keeping import ModelKeeping as ModelKeeping
 from .model_switch import ModelSwitch as ModelSwitch

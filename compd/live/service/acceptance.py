@@ -8,13 +8,12 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Sequence
-from typing import Any
 
 import structlog
 
 from compd.clock import Clock
 from compd.live.memory import Doubt, TrustMemory
-from compd.live.service.messages import line
+from compd.live.service.message_keys.answers import AcceptKeys
 
 # Votes look at 0.3 s of readings at most. Of a gauge that is read less often it is told that it has not been read yet.
 WATCHED_S = 1.0
@@ -53,13 +52,13 @@ class Acceptance:
             self._clock.wait(never, _LOOK_EVERY_S)
         now_s = self._clock.monotonic()
         not_believed = {channel: self._reason(channel) for channel in channels if channel not in since_s}
-        message: dict[str, Any] = {"class": "ACCEPT", "gauges": list(since_s)}
-        if since_s:
-            message["believed_for_s"] = {channel: round(now_s - begin_s, 3) for channel, begin_s in since_s.items()}
-        if not_believed:
-            message["not_believed"] = not_believed
+        believed_for_s = {channel: round(now_s - begin_s, 3) for channel, begin_s in since_s.items()}
         _log.warning("gauges accepted", gauge=gauge, channels=list(since_s), not_believed=not_believed)
-        answer(line(message))
+        answer(
+            AcceptKeys.line(
+                gauges=list(since_s), believed_for_s=believed_for_s or None, not_believed=not_believed or None
+            )
+        )
 
     def _is_believed(self, channel: str) -> bool:
         trust, i = self._trust, self._trust.index[channel]

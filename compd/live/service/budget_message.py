@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from compd.arrays import FloatArray
+from compd.live.service.message_keys.budget import BudgetKeys
 from compd.model import MachineModel, tip_by_scales
 from compd.model.external import ExternalModel
 from compd.model.kernels import Reason
@@ -45,10 +46,10 @@ class BudgetMessage:
         """The message as plain data; what the setpoint does not have is left out."""
         line = self._newest()
         if line is None:
-            return {"class": "BUDGET", "valid": False, "reason": "there is no setpoint yet"}
+            return BudgetKeys.message(valid=False, reason="there is no setpoint yet")
         setpoint = json.loads(line)
-        message = {"class": "BUDGET", **{key: setpoint[key] for key in ("seq", "time_s", "valid", "state", "reason")}}
-        return message | self._values(setpoint) if setpoint["valid"] else message
+        head = {key: setpoint[key] for key in ("seq", "time_s", "valid", "state", "reason")}
+        return BudgetKeys.message(**head, **(self._values(setpoint) if setpoint["valid"] else {}))
 
     def _pose_values(self, setpoint: Mapping[str, Any]) -> dict[str, Any]:
         """Where the pose is corrected: the sources are those of the tip."""

@@ -9,6 +9,7 @@ from pydantic import Field, model_validator
 
 from compd.live.loop import Target
 from compd.live.service.client_session import ClientSession, Place, Stream
+from compd.live.service.message_keys.answers import ReleaseKeys
 from compd.live.service.message_keys.budget import BudgetKeys
 from compd.live.service.message_keys.machine import MachineKeys
 from compd.live.service.message_keys.message import Keys, SentMessage, VersionKeys, absent, present
@@ -68,16 +69,16 @@ class WatchRequest(Request):
     )
 
     def answer(self, context: RequestContext, client: ClientSession, send_later: SendLater) -> bytes:
-        message = {"class": self.wire_name, **self.model_dump(exclude_unset=True)}
+        asked = self.model_dump(exclude_unset=True)
         if self.what == "setpoints":
             client.watch(self.rate_hz, Stream.SETPOINTS)
-            return line(message)
+            return WatchKeys.line(**asked)
         if not client.local or context.messages.readings is None:
             # READINGS are several times a SETPOINT's size, and their times are those of this computer's clock.
             raise ProtocolError(ErrorCode.UNIX_ONLY, "readings are watched over the Unix socket only")
         client.watch(self.rate_hz, Stream.READINGS)
         readings = context.messages.readings
-        return line(message | {"columns": readings.columns} | readings.from_setpoints)
+        return WatchKeys.line(**asked, columns=readings.columns, **readings.from_setpoints)
 
 
 class TargetRequest(Request):
@@ -149,12 +150,6 @@ class TargetRequest(Request):
         return self
 
 
-class ReleaseKeys(SentMessage):
-    """Answers RELEASE: the mode is CMM again."""
-
-    wire_name = "RELEASE"
-
-
 class ReleaseRequest(OrderRequest):
     """Gives the controller's role back: the mode is CMM again.
 
@@ -174,13 +169,7 @@ class ReleaseRequest(OrderRequest):
 
     def answer(self, context: RequestContext, client: ClientSession, send_later: SendLater) -> bytes:
         context.end_role(client)
-        return line({"class": self.wire_name})
-
-
-class AuthKeys(SentMessage):
-    """Greets a TCP client in place of VERSION where a token is configured: send AUTH with it."""
-
-    wire_name = "AUTH"
+        return ReleaseKeys.line()
 
 
 class AuthRequest(Request):

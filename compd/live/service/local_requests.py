@@ -8,25 +8,15 @@ import structlog
 from pydantic import Field, field_validator, model_validator
 
 from compd.live.service.client_session import ClientSession
-from compd.live.service.message_keys.message import ModelsKeys, SentMessage, absent, present
-from compd.live.service.messages import ErrorCode, ProtocolError, line
+from compd.live.service.message_keys.answers import AcceptKeys, ModelKeys, PollKeys, ZeroKeys
+from compd.live.service.message_keys.message import present
+from compd.live.service.messages import ErrorCode, ProtocolError
 from compd.live.service.model_switch import ModelWish
 from compd.live.service.order import OrderRequest
 from compd.live.service.request import Asker
 from compd.live.service.request_context import RequestContext, SendLater
 
 _log = structlog.get_logger()
-
-
-class AcceptKeys(SentMessage):
-    """Answers ACCEPT."""
-
-    wire_name = "ACCEPT"
-    gauges: list[str] = present("channels that are believed again by it; empty where all were already")
-    believed_for_s: dict[str, float] | None = absent(
-        "of each of them, for how long it has been believed when this is sent, s"
-    )
-    not_believed: dict[str, str] | None = absent("channels that are not believed after it either, each with the reason")
 
 
 class AcceptRequest(OrderRequest):
@@ -55,12 +45,6 @@ class AcceptRequest(OrderRequest):
         return b""
 
 
-class PollKeys(SentMessage):
-    """Answers POLL: the gauge will be polled within a second, if its line is open. STATUS counts its polls."""
-
-    wire_name = "POLL"
-
-
 class PollRequest(OrderRequest):
     """Has a gauge polled at once that did not answer, and that is asked seldom since because the others waited for it.
 
@@ -83,21 +67,7 @@ class PollRequest(OrderRequest):
         except ValueError as error:
             raise ProtocolError(ErrorCode.BAD_MESSAGE, str(error)) from error
         _log.info("poll requested", gauge=self.gauge, client=client.name)
-        return line({"class": self.wire_name})
-
-
-class ZeroKeys(SentMessage):
-    """Answers ZERO when machine zero has been taken."""
-
-    wire_name = "ZERO"
-    taken_at: str = present("when, UTC, ISO 8601")
-    path: str = present("the file in which it is kept")
-    readings_mm: dict[str, float] = present("mean raw reading of every length gauge, by channel, mm")
-    changed_mm: dict[str, float] | None = absent(
-        "by how much each gauge differs from the machine zero before, mm; absent where there was none"
-    )
-    quantities: dict[str, float] | None = absent("mean of every other quantity, by name: from these effects count")
-    without: list[str] | None = absent("quantities that could not be read; models with effects of these are refused")
+        return PollKeys.line()
 
 
 class ZeroRequest(OrderRequest):
@@ -120,14 +90,6 @@ class ZeroRequest(OrderRequest):
     def answer(self, context: RequestContext, client: ClientSession, send_later: SendLater) -> bytes:
         context.errands.take_zero(self.replace, send_later)
         return b""
-
-
-class ModelKeys(SentMessage, ModelsKeys):
-    """Answers MODEL."""
-
-    wire_name = "MODEL"
-    kept: bool = present("whether the daemon starts with the applied model again, by its configuration as it was read")
-    kept_text: str = present("the same for people, with what keeps it where it is not kept")
 
 
 class ModelRequest(OrderRequest):
@@ -189,4 +151,4 @@ class ModelRequest(OrderRequest):
                 ModelWish(self.file, self.shadow, self.hash), client.take_descriptor, send_later
             )
             return b""
-        return line({"class": self.wire_name, **context.messages.models()})
+        return ModelKeys.line(**context.messages.models())

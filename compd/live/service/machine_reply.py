@@ -7,24 +7,21 @@ from typing import Any
 
 from compd.configuration import Configuration
 from compd.live.machine import MachineWires, Wire
+from compd.live.service.message_keys.machine import MachineKeys
 from compd.operation_settings import LoopBasics
-from compd.text import omit_unknown
 
 
 def machine_message(configuration: Configuration, wires: MachineWires) -> dict[str, Any]:
     """The message as plain data: the sections of the configuration as a person wrote them, and the wiring resolved."""
-    message = {
-        "class": "MACHINE",
-        "machine": configuration.machine,
-        "config_hash": configuration.config_hash,
-        "geometry": _geometry(configuration),
+    return MachineKeys.message(
+        machine=configuration.machine,
+        config_hash=configuration.config_hash,
+        geometry=_geometry(configuration),
         **_mechanism(configuration),
-        "limits": configuration.limits.model_dump(mode="json"),
-        "loop": configuration.loop.model_dump(mode="json", include=set(LoopBasics.model_fields)),
-        "wiring": _wiring(configuration, wires),
-    }
-    known: dict[str, Any] = omit_unknown(message)
-    return known
+        limits=configuration.limits.model_dump(mode="json"),
+        loop=configuration.loop.model_dump(mode="json", include=set(LoopBasics.model_fields)),
+        wiring=_wiring(configuration, wires),
+    )
 
 
 def _geometry(configuration: Configuration) -> dict[str, Any]:

@@ -19,7 +19,8 @@ from compd.documents import MAX_BYTES
 from compd.files import read_descriptor
 from compd.live.machine import ModelText
 from compd.live.memory import Control
-from compd.live.service.messages import ErrorCode, ProtocolError, line
+from compd.live.service.message_keys.answers import ModelKeys
+from compd.live.service.messages import ErrorCode, ProtocolError
 
 # A file of 1 MB is read in milliseconds, from a network in a second.
 READ_WITHIN_S = 5.0
@@ -117,7 +118,7 @@ class ModelSwitch:
             return
         role = "shadow" if self._wish.shadow else "applied"
         _log.info("shadow" if self._wish.shadow else "model adopted", file=summary.get(role, {}).get("file", "none"))
-        self._send(line({"class": "MODEL", **summary, **self._keeping(summary)}))
+        self._send(ModelKeys.line(**summary, **self._keeping(summary)))
 
     def _begin(self, wish: ModelWish, answer: Callable[[bytes], None]) -> None:
         self._number += 1

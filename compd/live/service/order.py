@@ -13,7 +13,6 @@ from pydantic import AfterValidator, Field
 from compd.clock import Clock
 from compd.live.service.client_session import ClientSession
 from compd.live.service.message_keys.message import SentMessage, absent, present
-from compd.live.service.messages import line
 from compd.live.service.request import Request
 
 MAX_BY = 200
@@ -86,7 +85,9 @@ class OrderBook:
         else:
             reason = answer["text"]
             _log.warning("order refused", order=order, subject=subject, client=client.name, by=by, reason=reason)
-        message = {"class": OrderKeys.wire_name, "time_s": self._clock.monotonic(), "order": order}
-        message |= {"subject": subject} if subject else {}
-        message |= {"client": client.name} | ({"by": by} if by else {})
-        self._tell(line(message | {"done": done}))
+        at_s = self._clock.monotonic()
+        self._tell(
+            OrderKeys.line(
+                time_s=at_s, order=order, subject=subject or None, client=client.name, by=by or None, done=done
+            )
+        )

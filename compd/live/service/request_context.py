@@ -11,6 +11,7 @@ import structlog
 from compd.clock import Clock, MonotonicClock
 from compd.live.loop import Commands, Target
 from compd.live.service.client_session import ClientSession
+from compd.live.service.message_keys.answers import AcceptKeys
 from compd.live.service.messages import ErrorCode, ProtocolError, line
 from compd.live.service.model_switch import ModelWish
 from compd.live.service.readings_message import ReadingsMessage
@@ -43,7 +44,7 @@ class TargetKeys:
 
 
 def _accept_nothing(gauge: str, send_later: SendLater) -> None:
-    send_later(line({"class": "ACCEPT", "gauges": []}))
+    send_later(AcceptKeys.line(gauges=[]))
 
 
 def _tell_nobody(order: bytes) -> None:

@@ -13,8 +13,9 @@ from typing import Any
 from pydantic import ValidationError
 
 from compd.live.service import local_requests
-from compd.live.service.client_requests import AuthKeys, AuthRequest
+from compd.live.service.client_requests import AuthRequest
 from compd.live.service.client_session import ClientSession, Place
+from compd.live.service.message_keys.answers import AuthKeys
 from compd.live.service.message_keys.message import ErrorKeys, SentMessage
 from compd.live.service.message_keys.readings import ReadingsKeys
 from compd.live.service.message_keys.setpoint import SetpointKeys
@@ -23,7 +24,6 @@ from compd.live.service.messages import (
     ErrorCode,
     ProtocolError,
     bad_message,
-    line,
     parse,
 )
 from compd.live.service.order import OrderBook, OrderKeys, OrderRequest
@@ -65,7 +65,7 @@ class Requests:
     def greeting(self, client: ClientSession) -> bytes:
         """The first line for a client: VERSION, or AUTH where it has to show a token."""
         client.authorized = client.local or self.context.access is None or not self.context.access.needs_token
-        return self.context.version if client.authorized else line({"class": AuthKeys.wire_name})
+        return self.context.version if client.authorized else AuthKeys.line()
 
     def admits(self, address: str) -> bool:
         """Whether a client at this IP address may connect over TCP at all."""

@@ -13,10 +13,10 @@ from compd.gauge import Quality
 from compd.live.loop import AdoptedModels, Commands, Histogram, LoopTiming, skew_of
 from compd.live.machine import MachineWires, waiting_text
 from compd.live.memory import Control, Latest, TrustMemory
+from compd.live.service.message_keys.status import StatusKeys
 from compd.live.service.publisher import Publisher
 from compd.live.service.udp_sender import UdpSender
 from compd.live.system import changed_ports
-from compd.text import omit_unknown
 from compd.units import UM_PER_MM
 
 
@@ -57,24 +57,21 @@ class StatusReport:
         not_believed = [gauge["channel"] for gauge in gauges if gauge["quality"] is Quality.DISTRUSTED]
         if self.packets is not None:
             published |= self.packets.summary()
-        message = {
-            **self.version,
-            "class": "STATUS",
-            "time_s": round(now_s, 6),
-            "mode": "cmm" if self.commands.target is None else "machine_tool",
-            "zero": self._zero(),
-            "model": self._model(),
-            "loop": self._loop(),
-            "realtime": self.control.realtime.read() or {},
-            "processes": self.control.processes.read() or {},
-            "publisher": published,
-            "skew_s": self._skew_s(now_s),
-            "lines": self.lines(),
-            "gauges": gauges,
-            "waits_for_person": waiting_text(not_believed) or None,
-        }
-        known: dict[str, Any] = omit_unknown(message)
-        return known
+        return StatusKeys.message(
+            **{key: part for key, part in self.version.items() if key != "class"},
+            time_s=round(now_s, 6),
+            mode="cmm" if self.commands.target is None else "machine_tool",
+            zero=self._zero(),
+            model=self._model(),
+            loop=self._loop(),
+            realtime=self.control.realtime.read() or {},
+            processes=self.control.processes.read() or {},
+            publisher=published,
+            skew_s=self._skew_s(now_s),
+            lines=self.lines(),
+            gauges=gauges,
+            waits_for_person=waiting_text(not_believed) or None,
+        )
 
     def _loop(self) -> dict[str, Any]:
         summary = self.timing.summary()

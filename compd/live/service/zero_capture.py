@@ -18,8 +18,8 @@ from compd.gauge import Quality
 from compd.live.loop import Commands
 from compd.live.machine import MachineWires, MachineZero
 from compd.live.memory import Latest
-from compd.live.service.messages import ErrorCode, ProtocolError, line
-from compd.text import omit_unknown
+from compd.live.service.message_keys.answers import ZeroKeys
+from compd.live.service.messages import ErrorCode, ProtocolError
 
 
 class BackgroundJob:
@@ -138,16 +138,14 @@ class ZeroCapture:
         if without:
             _log.warning("machine zero is without quantities that could not be read", quantities=", ".join(without))
         _log.info("machine zero taken", path=str(path), changed_mm=_named(changed_mm) if changed_mm else "")
-        answer = {
-            "class": "ZERO",
-            "taken_at": zero.taken_at,
-            "path": str(path),
-            "readings_mm": dict(zero.readings_mm),
-            "quantities": dict(zero.quantities) or None,
-            "without": without or None,
-            "changed_mm": {channel: round(change_mm, 7) for channel, change_mm in changed_mm.items()} or None,
-        }
-        return line(omit_unknown(answer))
+        return ZeroKeys.line(
+            taken_at=zero.taken_at,
+            path=str(path),
+            readings_mm=zero.readings_mm,
+            quantities=zero.quantities or None,
+            without=without or None,
+            changed_mm={channel: round(change_mm, 7) for channel, change_mm in changed_mm.items()} or None,
+        )
 
     def _measure(self, replace: bool) -> tuple[MachineZero, dict[str, float]]:
         """A new machine zero, and by how much it differs from the one until now, by channel, mm.

@@ -97,3 +97,9 @@ def test_rows_with_an_empty_cell_are_counted(tmp_path: Path) -> None:
     assert export.name == ("P2",)
     assert export.line.tolist() == [3]
     assert export.left_out == {"with an empty cell": 2}
+
+
+def test_a_row_of_units_may_name_any_unit(tmp_path: Path) -> None:
+    for units in ("[µm];[µm];[µm];°C", "mm;mm;mm;hPa", "mm;mm;mm;-"):
+        text = f"X;Y;Z;T\n{units}\n1;2;3;20\n2;3;5;21\n3;5;4;20\n"
+        assert read(tmp_path, text, columns=["x", "y", "z", "-"]).line.tolist() == [3, 4, 5]

@@ -10,7 +10,7 @@ from pydantic import ValidationError
 
 from compd.configuration import load
 from compd.live.machine.model_loader import ModelLoader, Models
-from compd.live.service.message_keys.message import Keys
+from compd.live.service.message_keys.message import ErrorKeys, Keys
 from compd.live.service.messages import ErrorCode, ProtocolError
 from compd.live.service.requests import SENT_MESSAGES
 from compd.setpoint_states import State
@@ -125,6 +125,17 @@ def test_errors(code):
 def test_a_key_that_is_not_described_is_refused():
     with pytest.raises(ValidationError, match="surplus"):
         sent({"class": "RELEASE", "surplus": 1})
+
+
+def test_a_message_is_made_by_its_model_and_of_no_other_keys():
+    assert ErrorKeys.line(code="idle", text="why") == ProtocolError(ErrorCode.IDLE, "why").to_json()
+    assert SENT_MESSAGES["ZERO"].message(taken_at="now", without=None, changed_mm={"a": 0.0}) == {
+        "class": "ZERO",
+        "taken_at": "now",
+        "changed_mm": {"a": 0.0},
+    }
+    with pytest.raises(TypeError, match="ZERO has no token"):
+        SENT_MESSAGES["ZERO"].line(token="x")
 
 
 def kinds(kind: type[Keys]) -> set[type[Keys]]:

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from compd.errors import RecordingError
 from compd.instruments.formats.workbook.cells import TEXT, VALUES, Row
-from compd.units import KNOWN_UNITS
+from compd.instruments.header_names import is_unit_row, with_units
 
 AGAIN = "the header again"
-_UNIT = re.compile(r"[\[(]?\s*([^\s\[\]()]*)\s*[\])]?")
 
 
 @dataclass(frozen=True)
@@ -53,10 +51,10 @@ def find_table(place: str, rows: Sequence[Row]) -> SheetTable:
     names = _names(rows[heads[longest]])
     first = next(k for k in heads if _names(rows[k]) == names)
     header, header_row, begin, assumed = names, rows[first].number, first, {}
-    if _are_units(names) and first - 1 in heads and not _are_units(_names(rows[first - 1])):
+    if is_unit_row(names) and first - 1 in heads and not is_unit_row(_names(rows[first - 1])):
         begin = first - 1
         upper = _names(rows[begin])
-        header, header_row = _with_units(upper, names), rows[begin].number
+        header, header_row = with_units(upper, names), rows[begin].number
         assumed["units"] = f"row {rows[first].number}, below the names"
         again: list[tuple[str, ...]] = [upper, names]
     else:
@@ -98,31 +96,6 @@ def _names(row: Row) -> tuple[str, ...]:
     while texts and not texts[-1]:
         texts.pop()
     return tuple(texts)
-
-
-def _unit_in(text: str) -> str | None:
-    """The unit in a cell such as "mm", "[mm]" or "-"; None if it holds something else."""
-    match = _UNIT.fullmatch(text.strip().replace("\u00b5", "u").replace("\u03bc", "u").replace("\u00b0C", "degC"))
-    if match is None:
-        return None
-    unit = "" if match[1] in {"-", ""} else match[1]
-    return unit if not unit or unit in KNOWN_UNITS else None
-
-
-def _are_units(names: Sequence[str]) -> bool:
-    units = [_unit_in(name) for name in names]
-    return all(unit is not None for unit in units) and any(units)
-
-
-def _with_units(upper: Sequence[str], units: Sequence[str]) -> tuple[str, ...]:
-    """Names with the unit below each: ("X", "mm") is "X [mm]"."""
-    width = max(len(upper), len(units))
-    padded = [*upper, *[""] * (width - len(upper))], [*units, *[""] * (width - len(units))]
-    joined = []
-    for name, text in zip(*padded, strict=True):
-        unit = _unit_in(text)
-        joined.append(f"{name} [{unit}]" if unit else name)
-    return tuple(joined)
 
 
 def _above(rows: Sequence[Row]) -> dict[str, str]:

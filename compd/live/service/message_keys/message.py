@@ -7,7 +7,8 @@ from typing import Annotated, Any, ClassVar, get_type_hints
 
 from pydantic import BaseModel, ConfigDict, Field, create_model
 
-from compd.live.service.messages import ErrorCode
+from compd.live.service.messages import ErrorCode, line
+from compd.text import omit_unknown
 
 Vector = Annotated[list[float], Field(min_length=3, max_length=3)]
 Links = Annotated[list[float], Field(min_length=1, max_length=6)]
@@ -23,6 +24,18 @@ class SentMessage(Keys):
     """Base of all messages that the daemon sends. wire_name : the message's "class"."""
 
     wire_name: ClassVar[str]
+
+    @classmethod
+    def message(cls, **keys: Any) -> dict[str, Any]:
+        """The message as plain data, without unknown values. Raises TypeError for a key that is not declared."""
+        if other := keys.keys() - cls.model_fields.keys():
+            raise TypeError(f"{cls.wire_name} has no {', '.join(sorted(other))}")
+        return {"class": cls.wire_name, **omit_unknown(keys)}
+
+    @classmethod
+    def line(cls, **keys: Any) -> bytes:
+        """The message as it is sent."""
+        return line(cls.message(**keys))
 
 
 def present(description: str) -> Any:
