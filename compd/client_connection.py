@@ -14,6 +14,7 @@ import orjson
 from compd.errors import DaemonError
 
 _IS_IT_RUNNING = "is `compd run` running? its configuration says where it listens, under `sockets:`"
+_NOT_ALLOWED = "join the socket's group: `usermod --append --groups compd NAME`, then log in again; or name host:port"
 
 _RECEIVE_BYTES = 1 << 16
 
@@ -33,9 +34,8 @@ def open_connection(address: str, timeout_s: float) -> ClientConnection:
             "address", "not an address", value=address, allowed="host:port, or the path of a Unix socket"
         ) from error
     except OSError as error:
-        raise DaemonError.of(
-            address, f"no daemon answers: {error.strerror or error}", next_step=_IS_IT_RUNNING
-        ) from error
+        step = _NOT_ALLOWED if isinstance(error, PermissionError) else _IS_IT_RUNNING
+        raise DaemonError.of(address, f"no daemon answers: {error.strerror or error}", next_step=step) from error
     return ClientConnection(connected, address)
 
 

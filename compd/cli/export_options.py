@@ -44,30 +44,24 @@ class ExportForm(NamedTuple):
     columns: Annotated[
         str | None,
         typer.Option(
-            "--columns",
             help="Roles of the columns, in order: time, date, x, y, z, rx, ry, rz, length, name, visit, "
             "reflector, group, collection, or - for one that is not used: name,x,y,z,-. With a unit: time[ms],x[inch].",
         ),
     ] = None
-    unit: Annotated[str | None, typer.Option("--unit", help="Unit of the lengths, if the file has none.")] = None
-    angle_unit: Annotated[
-        str | None, typer.Option("--angle-unit", help="Unit of rx, ry, rz, if the file has none.")
-    ] = None
+    unit: Annotated[str | None, typer.Option(help="Unit of the lengths, if the file has none.")] = None
+    angle_unit: Annotated[str | None, typer.Option(help="Unit of rx, ry, rz, if the file has none.")] = None
     angles: Annotated[
         str | None,
         typer.Option(
-            "--angles",
             metavar="ORDER",
             help="What rx, ry, rz are: vector; or the order of turning: xyz about fixed axes, XYZ about turned ones.",
         ),
     ] = None
-    decimal: Annotated[
-        str | None, typer.Option("--decimal", help="The decimal mark, '.' or ',', if the file is ambiguous.")
-    ] = None
-    dates: Annotated[
-        DateOrder | None, typer.Option("--dates", help="Order of day, month and year, if the file is ambiguous.")
-    ] = None
-    rate_hz: Annotated[float | None, typer.Option("--rate-hz", help="Rows per second, if rows have no time.")] = None
+    decimal: Annotated[str | None, typer.Option(help="The decimal mark, '.' or ',', if the file is ambiguous.")] = None
+    dates: Annotated[DateOrder | None, typer.Option(help="Order of day, month and year, if the file is ambiguous.")] = (
+        None
+    )
+    rate_hz: Annotated[float | None, typer.Option(help="Rows per second, if rows have no time.")] = None
     clock_set_back: Annotated[
         bool,
         typer.Option(
@@ -75,9 +69,9 @@ class ExportForm(NamedTuple):
         ),
     ] = False
     group: Annotated[
-        str | None, typer.Option("--group", help="The group of points to take, if there are several; all for all.")
+        str | None, typer.Option(help="The group of points to take, if there are several; all for all.")
     ] = None
-    sheet: Annotated[str | None, typer.Option("--sheet", help="The sheet of a workbook, if there are several.")] = None
+    sheet: Annotated[str | None, typer.Option(help="The sheet of a workbook, if there are several.")] = None
 
     def read_as(self, names: Mapping[str, str | None], prefix: str = "--") -> ReadOptions:
         """The options of the reader. Raises typer.BadParameter for an invalid decimal mark.
@@ -102,8 +96,7 @@ class LogForm(NamedTuple):
     log_decimal: Annotated[str | None, typer.Option(help="The log's decimal mark, if it is ambiguous.")] = None
     log_dates: Annotated[DateOrder | None, typer.Option(help="The log's order of dates, if it is ambiguous.")] = None
     log_angles: Annotated[
-        str | None,
-        typer.Option(metavar="ORDER", help="What the log's angles are, as --angles of the export."),
+        str | None, typer.Option(metavar="ORDER", help="What the log's angles are, as --angles of the export.")
     ] = None
     log_clock_set_back: Annotated[
         bool, typer.Option("--log-clock-set-back", help="The log's times fall by an hour, as summer time ended.")

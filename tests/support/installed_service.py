@@ -97,7 +97,7 @@ def simulate(container: Container, program: Path) -> None:
     container.run(
         *("systemd-run", "--unit=simulated-machine", "--quiet"),
         *("--property=User=compd", f"--property=RuntimeDirectory={SIMULATED.name}"),
-        *(str(program), "simulate", str(CONFIGURATIONS / SHIPPED)),
+        *(str(program), "sim", "run", str(CONFIGURATIONS / SHIPPED)),
         *(f"--directory={SIMULATED}", f"--zero-hold={ZERO_HOLD_S}"),
     )
     wait_until(container.path(SIMULATED / "control.sock").exists, "the simulated machine", PATIENCE_S)

@@ -31,7 +31,7 @@ TIMEOUT_S = 200.0
 START_S = 60.0
 POLL_EVERY_S = 0.05
 # Sockets that exist once these commands are ready for the next one.
-READY = {"simulate": "control.sock", "run": "compd.sock"}
+READY = {"compd sim run": "control.sock", "compd run": "compd.sock"}
 # Other programs that serve until they are ended. They are ready when they have printed what the page shows.
 SERVERS = ("mosquitto",)
 # The port of a broker that pages start; while a test runs, one that is free.
@@ -175,17 +175,18 @@ class Terminal:
 
     def _ready_socket(self, words: list[str]) -> Path | None:
         """The socket that a command which serves others makes; None for one that ends by itself."""
-        if words[:1] != ["compd"] or words[1] not in READY:
+        socket = READY.get(" ".join(words[:3]), READY.get(" ".join(words[:2])))
+        if socket is None:
             return None
         if "--directory" in words:
-            return self.directory / words[words.index("--directory") + 1] / READY[words[1]]
-        return (self.directory / words[2]).parent / READY[words[1]]
+            return self.directory / words[words.index("--directory") + 1] / socket
+        return (self.directory / words[2]).parent / socket
 
     def _run(self, shown: Shown) -> None:
         words = shlex.split(shown.command, comments=True)
-        if words[:2] == ["compd", "zero"]:
+        if words[:3] == ["compd", "zero", "--daemon"]:
             # a person types slower than gauges come up
-            with connect(words[2]) as observer, connect(words[2]) as daemon:
+            with connect(words[3]) as observer, connect(words[3]) as daemon:
                 wait_for_gauges(observer, daemon.watch(10.0))
         with self._popen(shown.command, subprocess.PIPE) as process:
             clock = threading.Timer(TIMEOUT_S, process.kill)

@@ -16,7 +16,7 @@ TUTORIAL = "docs/tutorials/missing-effect.md"
 
 
 # A machine that is simulated in real time has both processors for itself; other pages run side by side.
-MACHINE = re.compile(r"^\$ (compd (simulate|run|demo|page)|make demo)\b", re.MULTILINE)
+MACHINE = re.compile(r"^\$ (compd (sim run|run|demo|page)|make demo)\b", re.MULTILINE)
 PAGES = [name for name in page_names() if name != TUTORIAL]
 WITH_MACHINE = [name for name in PAGES if MACHINE.search((ROOT / name).read_text(encoding="utf-8"))]
 # Pages that start a program which is not of this project.

@@ -27,12 +27,11 @@ def calibrate(
     machine: MachineOption = None,
     sealed: Annotated[
         list[Path] | None,
-        typer.Option("--sealed", metavar="RECORDING", help="A recording that is looked at last. May be repeated."),
+        typer.Option(metavar="RECORDING", help="A recording that is looked at last. May be repeated."),
     ] = None,
     check: Annotated[
         Path | None,
         typer.Option(
-            "--check",
             metavar="RECORDING",
             help="Poses of another day: whether the calibration still holds there, and which numbers have changed.",
         ),
@@ -42,7 +41,6 @@ def calibrate(
     out: Annotated[
         Path | None,
         typer.Option(
-            "--out",
             metavar="FILE",
             help="The machine as built: the configuration with the numbers found, NAME.yaml, and NAME-model.yaml with "
             "what no drawing states, such as gains.",

@@ -34,7 +34,6 @@ def plan(
     calibrate: Annotated[
         int | None,
         typer.Option(
-            "--calibrate",
             min=1,
             metavar="N",
             help="In place of rivals: N poses that tell most of how the machine is built, for `compd calibrate`.",
@@ -43,7 +42,6 @@ def plan(
     noise: Annotated[
         str | None,
         typer.Option(
-            "--noise",
             metavar="UM[,URAD]",
             help="With --calibrate: standard deviation of the instrument, um of a position; of whole poses urad of the "
             "attitude as well.",
@@ -52,15 +50,13 @@ def plan(
     rows: Annotated[int, typer.Option(min=2, help="Number of rows to measure.")] = 40,
     out: Annotated[Path | None, typer.Option(help="File for the rows (CSV); default: the screen.")] = None,
     machine: MachineOption = None,
-    model: Annotated[Path | None, typer.Option("--model", help="The model file with the known effects.")] = None,
+    model: Annotated[Path | None, typer.Option(help="The model file with the known effects.")] = None,
     effects: EffectsOption = None,
     beside: Annotated[
-        str | None,
-        typer.Option(help="Other effects found outside the model, by id: C,D. They are fitted along."),
+        str | None, typer.Option(help="Other effects found outside the model, by id: C,D. They are fitted along.")
     ] = None,
     workspace: Annotated[
-        str | None,
-        typer.Option(help="Workspace of the tip in mm: x0,x1,y0,y1,z0,z1; default: as in the recording."),
+        str | None, typer.Option(help="Workspace of the tip in mm: x0,x1,y0,y1,z0,z1; default: as in the recording.")
     ] = None,
     force: Annotated[float | None, typer.Option(min=0, help="Largest load in N; default: as in the recording.")] = None,
     temperature: Annotated[

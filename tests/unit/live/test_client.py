@@ -41,6 +41,16 @@ def test_nobody_there_says_what_to_do(address):
         connect(address)
 
 
+def test_a_socket_of_a_group_that_one_is_not_in_says_how_to_join_it(monkeypatch):
+    def refused(self, address):
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr(socket.socket, "connect", refused)
+    with pytest.raises(DaemonError, match="usermod --append --groups compd NAME") as caught:
+        connect("/run/compd/compd.sock")
+    assert "is `compd run` running" not in str(caught.value)
+
+
 @pytest.mark.parametrize("address", ["here", "localhost:http", ""])
 def test_what_is_no_address_is_named(address):
     with pytest.raises(DaemonError, match="host:port, or the path of a Unix socket"):

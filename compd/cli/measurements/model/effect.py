@@ -31,7 +31,7 @@ effect = typer.Typer()
 class StepOptions(NamedTuple):
     """Options of every step that fits a model to a recording."""
 
-    recording: Annotated[Path, typer.Option("--recording", help="The recording for the fit: NAME.csv or NAME.parquet.")]
+    recording: Annotated[Path, typer.Option(help="The recording for the fit: NAME.csv or NAME.parquet.")]
     model: ModelOption
     machine: MachineOption = None
     hold: HoldOption = None
@@ -59,7 +59,7 @@ def list_effects(effects: EffectsOption = None) -> None:
 def show(
     name: Annotated[str, typer.Argument(metavar="EFFECT", help=EFFECT_HELP), PathKind.NAME_OR_FILE],
     machine: Annotated[
-        Path | None, typer.Option("--machine", help="Machine configuration (YAML); default: the shipped tripod.")
+        Path | None, typer.Option(help="Machine configuration (YAML); default: the shipped tripod.")
     ] = None,
     effects: EffectsOption = None,
     page: PageOptions = PageOptions(),

@@ -53,7 +53,7 @@ def merge(
     machine: MachineOption = None,
     overwrite: Annotated[bool, typer.Option(help="Overwrite existing files.")] = False,
 ) -> None:
-    """Merge recordings of one machine, so that compare, diagnose and effect add learn from all of them."""
+    """Merge recordings of one machine, so that compare, diagnose and model add learn from all of them."""
     from compd.comparison import read_with_machine
     from compd.errors import CompdError, Problem
     from compd.recording import ASSUMED_GAP_S, merge_recordings

@@ -35,8 +35,7 @@ class DimensionOptions(NamedTuple):
         ),
     ] = None
     base_angle_deg: Annotated[
-        float | None,
-        typer.Option("--base-angle", help="Six legs: between the two base joints of a pair, degrees."),
+        float | None, typer.Option("--base-angle", help="Six legs: between the two base joints of a pair, degrees.")
     ] = None
     platform_angle_deg: Annotated[
         float | None,
@@ -55,18 +54,16 @@ def new(
     kind: Annotated[
         Kind,
         typer.Option(
-            "--kind",
             help="6-ups: six legs that extend; 6-pus: six rods on rails; 6-rus: six cranks with rods; 3-spr, 3-rps: "
             "three legs that extend, hinged at the platform or at the base; 3-prs: three rods on rails; linear-delta, "
             "rotary-delta: three carriages or cranks with two rods each.",
         ),
     ],
-    out: Annotated[Path | None, typer.Option("--out", help="Write the file; left out, the text is printed.")] = None,
-    name: Annotated[str | None, typer.Option("--name", help="Of the machine; left out, that of the file.")] = None,
+    out: Annotated[Path | None, typer.Option(help="Write the file; left out, the text is printed.")] = None,
+    name: Annotated[str | None, typer.Option(help="Of the machine; left out, that of the file.")] = None,
     given: DimensionOptions = DimensionOptions(),
     tolerance: Annotated[
-        Tolerance,
-        typer.Option("--tolerance", help="How the machine is made: what is plausible of its geometry follows."),
+        Tolerance, typer.Option(help="How the machine is made: what is plausible of its geometry follows.")
     ] = "machined",
     overwrite: OverwriteOption = False,
 ) -> None:
@@ -92,7 +89,7 @@ def new(
 def draw(
     config: Annotated[Path, typer.Argument(help="The machine's configuration (YAML).")],
     out: Annotated[
-        Path | None, typer.Option("--out", help="The picture, SVG; left out, the configuration's name with .svg.")
+        Path | None, typer.Option(help="The picture, SVG; left out, the configuration's name with .svg.")
     ] = None,
     overwrite: OverwriteOption = False,
 ) -> None:
@@ -141,10 +138,8 @@ def export(
         ),
     ] = None,
     bed_M_mm: Annotated[float, typer.Option("--bed", help="Deltas: height of the controller's z 0 in {M}, mm.")] = 0.0,
-    endstops: Annotated[
-        str, typer.Option("--endstops", help="Deltas: readings of scales 1, 2, 3 at the endstops, mm.")
-    ] = "0,0,0",
-    out: Annotated[Path | None, typer.Option("--out", help="Write the file; left out, the text is printed.")] = None,
+    endstops: Annotated[str, typer.Option(help="Deltas: readings of scales 1, 2, 3 at the endstops, mm.")] = "0,0,0",
+    out: Annotated[Path | None, typer.Option(help="Write the file; left out, the text is printed.")] = None,
     overwrite: OverwriteOption = False,
 ) -> None:
     """Write a machine's numbers for other programs: a table of all, or the settings of a delta's controller.

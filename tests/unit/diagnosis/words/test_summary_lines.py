@@ -51,9 +51,9 @@ Left:     0.16 um; noise 0.15 um (repeats): only noise is left
 Sure:     link_elasticity k = 27.97 +- 0.29 N/um; backlash b_1 to b_3 = 0.884,
           1.103, 0.795 (+- 0.020) um; more below
 Or else:  no other effect that was tried does as well
-Next:     add it: compd model add link_elasticity --recording monday.csv
-          --model FILE, then backlash; try it on another day's recording: compd
-          compare OTHER.csv --model FILE
+Next:     add it: compd model add link_elasticity --recording monday.csv --model
+          FILE, then backlash; try it on another day's recording: compd compare
+          OTHER.csv --model FILE
 """,
     rivals: """
 ambiguous: link_elasticity or joint_contact is missing; these rows cannot tell
