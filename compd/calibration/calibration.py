@@ -169,73 +169,38 @@ class PredictionMap(NamedTuple):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Calibration:
-    """The machine as built, from its drawing and measured poses; P numbers of all blocks that were tried.
+    """The machine as built, from its drawing and measured poses; P numbers of all blocks that were tried."""
 
-    Attributes
-    ----------
-    machine : str
-        Its name.
-    recordings : tuple of str
-        The files that it was learned from.
-    numbers : tuple of CalibratedNumber
-        P numbers, of needed and of other blocks, in the order of the blocks and of `covariance`.
-    covariance : (P, P) array
-        Of the values, in their units: the mean square of their errors.
-    fitted : tuple of FittedEffect
-        The blocks of the machine as built as effects of a model, from which predictions follow; each with its
-        covariance: all that the drawing states and poses can test, and needed ones.
-    fitted_covariance : (Q, Q) array
-        Of their parameters jointly, in the order of `fitted`.
-    blocks : tuple of TriedBlock
-        What was tried, in order of trial.
-    learned : tuple of PoseErrors
-        Of the poses that it was learned from, one for each recording.
-    held_out : tuple of PoseErrors
-        Of random poses, and of whole regions, that the numbers were not learned from.
-    sealed : tuple of PoseErrors
-        Of recordings that were opened last; registered alone.
-    held : tuple of HeldCombination
-        What these poses cannot tell.
-    gross : tuple of GrossPose
-        Poses left out.
-    warnings : tuple of str
-        Whatever a reader must know before he trusts it: a scale of length that is not in the data, poses that are all
-        at one height.
-    noise_um, noise_urad : float
-        Of the measurement, per coordinate; nan where nothing says it.
-    left_over : float
-        Variance of held-out errors over that of the noise; 1 where only noise is left.
-    sigma_mm : (w,) array
-        Standard deviation of what is left of the first recording, of each coordinate that was weighed: a urad of an
-        attitude as a um.
-    in_links : bool
-        Whether poses were weighed as errors of links, which then have one scatter: the machine errs more than the
-        instrument.
-    prior_scale : dict
-        Block, and by which factor the tolerance was scaled to fit what the poses tell of it.
-    prediction : PredictionMap or None
-        How uncertain the prediction is over the workspace; None for a tool that stands on the plate.
-    """
-
-    machine: str
-    recordings: tuple[str, ...]
+    machine: str  #: its name
+    recordings: tuple[str, ...]  #: the files that it was learned from
+    #: P numbers, of needed and of other blocks, in the order of the blocks and of `covariance`
     numbers: tuple[CalibratedNumber, ...]
-    covariance: FloatArray
+    covariance: FloatArray  #: (P, P) array: of the values, in their units: the mean square of their errors
+    #: the blocks of the machine as built as effects of a model, from which predictions follow; each with its
+    #: covariance: all that the drawing states and poses can test, and needed ones
     fitted: tuple[FittedEffect, ...]
-    fitted_covariance: FloatArray
-    blocks: tuple[TriedBlock, ...]
-    learned: tuple[PoseErrors, ...]
-    held_out: tuple[PoseErrors, ...]
-    sealed: tuple[PoseErrors, ...]
-    held: tuple[HeldCombination, ...]
-    gross: tuple[GrossPose, ...]
+    fitted_covariance: FloatArray  #: (Q, Q) array: of their parameters jointly, in the order of `fitted`
+    blocks: tuple[TriedBlock, ...]  #: what was tried, in order of trial
+    learned: tuple[PoseErrors, ...]  #: of the poses that it was learned from, one for each recording
+    held_out: tuple[PoseErrors, ...]  #: of random poses, and of whole regions, that the numbers were not learned from
+    sealed: tuple[PoseErrors, ...]  #: of recordings that were opened last; registered alone
+    held: tuple[HeldCombination, ...]  #: what these poses cannot tell
+    gross: tuple[GrossPose, ...]  #: poses left out
+    #: whatever a reader must know before he trusts it: a scale of length that is not in the data, poses that are all at
+    #: one height
     warnings: tuple[str, ...]
-    noise_um: float
+    noise_um: float  #: noise_um, noise_urad: of the measurement, per coordinate; nan where nothing says it
     noise_urad: float
-    left_over: float
+    left_over: float  #: variance of held-out errors over that of the noise; 1 where only noise is left
+    #: (w,) array: standard deviation of what is left of the first recording, of each coordinate that was weighed: a
+    #: urad of an attitude as a um
     sigma_mm: FloatArray
+    #: whether poses were weighed as errors of links, which then have one scatter: the machine errs more than the
+    #: instrument
     in_links: bool
+    #: block, and by which factor the tolerance was scaled to fit what the poses tell of it
     prior_scale: dict[str, float]
+    #: how uncertain the prediction is over the workspace; None for a tool that stands on the plate
     prediction: PredictionMap | None
 
     @property

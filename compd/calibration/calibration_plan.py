@@ -46,31 +46,16 @@ class Noise(NamedTuple):
 
 @dataclass(frozen=True)
 class CalibrationPlan:
-    """Poses to measure for a calibration.
+    """Poses to measure for a calibration."""
 
-    Attributes
-    ----------
-    rows : tuple of dict
-        Each column of the plan's file and its value, in the order of a short way.
-    measured : str
-        What the instrument is to measure at each: ``"position"`` or ``"pose"``.
-    observability : Observability
-        Of these poses and of those that were measured before.
-    tip_std_um : float
-        Standard error of the tip after the calibration, rms over the workspace, in space, after a rigid motion of the
-        whole machine, which an instrument's frame cannot tell. By the tolerance alone `tip_prior_um`.
-    tip_prior_um : float
-        The same before any pose.
-    numbers : int
-        Numbers of the drawing.
-    """
-
-    rows: tuple[dict[str, Any], ...]
-    measured: Measured
-    observability: Observability
+    rows: tuple[dict[str, Any], ...]  #: each column of the plan's file and its value, in the order of a short way
+    measured: Measured  #: what the instrument is to measure at each: ``"position"`` or ``"pose"``
+    observability: Observability  #: of these poses and of those that were measured before
+    #: standard error of the tip after the calibration, rms over the workspace, in space, after a rigid motion of the
+    #: whole machine, which an instrument's frame cannot tell. By the tolerance alone `tip_prior_um`.
     tip_std_um: float
-    tip_prior_um: float
-    numbers: int
+    tip_prior_um: float  #: the same before any pose
+    numbers: int  #: numbers of the drawing
 
     @property
     def summary(self) -> str:

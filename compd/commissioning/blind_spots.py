@@ -33,24 +33,14 @@ from compd.stated_noise import SCATTER_RATIO
 
 @dataclass(frozen=True)
 class BlindSpot:
-    """One kind of fault.
+    """One kind of fault."""
 
-    Attributes
-    ----------
-    name : stable, for programs.
-    fault : what happens.
-    shown_by : what shows it, and under which condition; "" if nothing does.
-    vote : the key under `votes:` (`VoteSettings`) for this; "" if it needs none, or there is none.
-    unseen : what remains that nothing shows.
-    cost : its number for a machine; "" if it has none there.
-    """
-
-    name: str
-    fault: str
-    shown_by: str
-    vote: str
-    unseen: str
-    cost: Callable[[Figures], str]
+    name: str  #: stable, for programs
+    fault: str  #: what happens
+    shown_by: str  #: what shows it, and under which condition; "" if nothing does
+    vote: str  #: the key under `votes:` (`VoteSettings`) for this; "" if it needs none, or there is none
+    unseen: str  #: what remains that nothing shows
+    cost: Callable[[Figures], str]  #: its number for a machine; "" if it has none there
 
 
 def shown_by(spot: BlindSpot, configuration: Configuration | None = None) -> str:

@@ -57,17 +57,11 @@ class WarmStart(NamedTuple):
 
 
 class Contributions(Mapping[str, FloatArray]):
-    """The contribution (..., m) of each cause, by its name; their sum is the correction but for rounding.
-
-    Attributes
-    ----------
-    causes : "joints", "frame", and the id of each effect.
-    by_cause_mm : (K, ..., m), in the order of `causes`.
-    """
+    """The contribution (..., m) of each cause, by its name; their sum is the correction but for rounding."""
 
     def __init__(self, causes: Sequence[str], by_cause_mm: FloatArray) -> None:
-        self.causes = causes
-        self.by_cause_mm = by_cause_mm
+        self.causes = causes  #: "joints", "frame", and the id of each effect
+        self.by_cause_mm = by_cause_mm  #: (K, ..., m), in the order of `causes`.
 
     def __getitem__(self, cause: str) -> FloatArray:
         if cause not in self.causes:

@@ -278,27 +278,13 @@ class CandidateResult:
 
 @dataclass(frozen=True)
 class ImplausibleEffect:
-    """An effect that would explain the error better than all that is named, with a number outside its plausible range.
+    """An effect that would explain more than all that is named, with a number outside its plausible range."""
 
-    Attributes
-    ----------
-    effect : str
-        Its id.
-    heldout_rms_um : float
-        Error on rows that were left out, with the effect alone, um per coordinate.
-    explained_fraction : float
-        Share of what is above the noise floor that it explains alone, 0 to 1.
-    number : ParameterEstimate
-        The one that exceeds its range the most.
-    parameter : Parameter
-        What the number is of, with the range and its source.
-    """
-
-    effect: str
-    heldout_rms_um: float
-    explained_fraction: float
-    number: ParameterEstimate
-    parameter: Parameter
+    effect: str  #: its id
+    heldout_rms_um: float  #: error on rows that were left out, with the effect alone, um per coordinate
+    explained_fraction: float  #: share of what is above the noise floor that it explains alone, 0 to 1
+    number: ParameterEstimate  #: the one that exceeds its range the most
+    parameter: Parameter  #: what the number is of, with the range and its source
 
     def as_json(self) -> dict[str, Any]:
         """Keys of the verdict's `asked`."""
@@ -316,24 +302,13 @@ class ImplausibleEffect:
 
 @dataclass(frozen=True)
 class ConstantFinding:
-    """A constant along the measured coordinates: no effect's signature, and every effect's that moves all rows alike.
+    """A constant along the measured coordinates: the signature of every effect that moves all rows alike."""
 
-    Attributes
-    ----------
-    by_axis_um : dict
-        The constant of each coordinate, um.
-    std_um : dict
-        Its standard error; nan where it is not known.
-    effects : tuple of str
-        Ids of effects that make nothing but a constant on these rows: any of them may be its cause.
-    separated_by : str
-        What would part them, in words.
-    """
-
-    by_axis_um: Mapping[str, float]
-    std_um: Mapping[str, float]
+    by_axis_um: Mapping[str, float]  #: the constant of each coordinate, um
+    std_um: Mapping[str, float]  #: its standard error; nan where it is not known
+    #: ids of effects that make nothing but a constant on these rows: any of them may be its cause
     effects: tuple[str, ...]
-    separated_by: str = ""
+    separated_by: str = ""  #: what would part them, in words
 
     def as_json(self) -> dict[str, Any]:
         """Keys of the verdict's `constant`."""
@@ -347,24 +322,12 @@ class ConstantFinding:
 
 @dataclass(frozen=True)
 class UnknownStates:
-    """A lag that was out of equilibrium when sessions began: its states there are fitted along, in every comparison.
+    """A lag that was out of equilibrium when sessions began: its states there are fitted along, in every comparison."""
 
-    Attributes
-    ----------
-    effect : str
-        Its id.
-    numbers : int
-        How many states are fitted.
-    before_um : float
-        Error on rows that were left out with neither the states nor an effect, um per coordinate.
-    after_um : float
-        The same with the states.
-    """
-
-    effect: str
-    numbers: int
-    before_um: float
-    after_um: float
+    effect: str  #: its id
+    numbers: int  #: how many states are fitted
+    before_um: float  #: error on rows that were left out with neither the states nor an effect, um per coordinate
+    after_um: float  #: the same with the states
 
     def as_json(self) -> dict[str, Any]:
         """Keys of the verdict's `start`."""
@@ -373,34 +336,18 @@ class UnknownStates:
 
 @dataclass(frozen=True)
 class GrossRows:
-    """Rows that neither noise nor anything that was found explains; they do not count.
+    """Rows that neither noise nor anything that was found explains; they do not count."""
 
-    Attributes
-    ----------
-    rows : tuple of int
-        As a spreadsheet shows them, rising.
-    runs : tuple of (int, int)
-        First and last row of each stretch in which most rows are gross: there something happened.
-    """
-
-    rows: tuple[int, ...] = ()
+    rows: tuple[int, ...] = ()  #: as a spreadsheet shows them, rising
+    #: (int, int): first and last row of each stretch in which most rows are gross: there something happened
     runs: tuple[tuple[int, int], ...] = ()
 
 
 @dataclass(frozen=True)
 class UntestedEffect:
-    """An effect that cannot be tried on the recording, with the reason and what to measure.
+    """An effect that cannot be tried on the recording, with the reason and what to measure."""
 
-    Attributes
-    ----------
-    effect : str
-        Its id.
-    why : str
-        Why it cannot be tried.
-    likely : bool
-        Whether what was found could be this effect, seen through a quantity that goes along with its own.
-    """
-
-    effect: str
-    why: str
+    effect: str  #: its id
+    why: str  #: why it cannot be tried
+    #: whether what was found could be this effect, seen through a quantity that goes along with its own
     likely: bool = False

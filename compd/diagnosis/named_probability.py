@@ -14,27 +14,16 @@ NOT_TESTED = "no effect could be tested, so that none was compared with another"
 
 @dataclass(frozen=True)
 class NamedProbability:
-    """How probable it is that all that has to be named is named, and nothing else.
+    """How probable it is that all that has to be named is named, and nothing else."""
 
-    Attributes
-    ----------
-    better_sets : float
-        Expected number of the sets that were seen, name something else, and would score better on rows like these; 0
-        where descriptions refuse every effect, nan where none was compared.
-    sets_told : int
-        How many sets the verdict itself tells as possible: with each named effect or a rival in its place.
-    above_noise : bool
-        Whether a part of the error above the noise has neither name nor description.
-    unknown : str
-        Why no probability can be stated; ``""`` where one is.
-    criteria : ProbabilityCriteria
-        The numbers by which odds follow from these.
-    """
-
+    #: expected number of the sets that were seen, name something else, and would score better on rows like these; 0
+    #: where descriptions refuse every effect, nan where none was compared
     better_sets: float = math.nan
+    #: how many sets the verdict itself tells as possible: with each named effect or a rival in its place
     sets_told: int = 1
-    above_noise: bool = False
-    unknown: str = ""
+    above_noise: bool = False  #: whether a part of the error above the noise has neither name nor description
+    unknown: str = ""  #: why no probability can be stated; ``""`` where one is
+    #: the numbers by which odds follow from these
     criteria: ProbabilityCriteria = field(default=ProbabilityCriteria(), repr=False)
 
     @property

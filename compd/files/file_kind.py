@@ -17,22 +17,15 @@ from compd.errors import Problem
 
 @dataclass(frozen=True)
 class FileKind:
-    """A kind of file that holds a mapping, or a list of them.
+    """A kind of file that holds a mapping, or a list of them."""
 
-    Attributes
-    ----------
-    name : with its article, "a model file".
-    keys : those that make a file one of this kind; `least` of them must be there.
-    others : further keys that it may have. Most of the keys of a file must be among `keys` and these.
-    next_step : where such a file comes from.
-    listed_under : the key under which there may be several such mappings; a list of them may also be the whole file.
-    """
-
-    name: str
-    keys: frozenset[str]
+    name: str  #: with its article, "a model file"
+    keys: frozenset[str]  #: those that make a file one of this kind; `least` of them must be there
     least: int
+    #: further keys that it may have. Most of the keys of a file must be among `keys` and these.
     others: frozenset[str] = frozenset()
-    next_step: str = ""
+    next_step: str = ""  #: where such a file comes from
+    #: the key under which there may be several such mappings; a list of them may also be the whole file
     listed_under: str = ""
 
     def recognises(self, data: Any) -> bool:

@@ -29,33 +29,24 @@ _SECONDS_PER_DAY = 86400.0
 
 @dataclass(frozen=True, eq=False)
 class Drift:
-    """One parameter of one machine over its C campaigns.
+    """One parameter of one machine over its C campaigns."""
 
-    Attributes
-    ----------
-    machine, kinematics, effect, parameter, unit : whose values they are.
-    started_at : when each campaign began; empty where one of them does not say.
-    time : (C,) days since the machine's first campaign; without `started_at` their number, from 1.
-    value, standard_error : (C,) in `unit`.
-    intercept, slope, slope_std : of the line, in `unit` and `unit` per day (or per campaign); nan where there is none.
-    p_value : chance of so steep a line for a parameter that stays the same; nan where there is no line.
-    named : whether that is too rare to be chance.
-    """
-
-    machine: str
+    machine: str  #: machine, kinematics, effect, parameter, unit: whose values they are
     kinematics: str
     effect: str
     parameter: str
     unit: str
-    started_at: tuple[datetime, ...]
-    time: FloatArray
-    value: FloatArray
+    started_at: tuple[datetime, ...]  #: when each campaign began; empty where one of them does not say
+    time: FloatArray  #: (C,) days since the machine's first campaign; without `started_at` their number, from 1
+    value: FloatArray  #: value, standard_error: (C,) in `unit`
     standard_error: FloatArray
+    #: intercept, slope, slope_std: of the line, in `unit` and `unit` per day (or per campaign); nan where there is none
     intercept: float = math.nan
     slope: float = math.nan
     slope_std: float = math.nan
+    #: chance of so steep a line for a parameter that stays the same; nan where there is no line
     p_value: float = math.nan
-    named: bool = False
+    named: bool = False  #: whether that is too rare to be chance
 
     @property
     def name(self) -> str:

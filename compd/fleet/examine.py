@@ -19,17 +19,11 @@ BATCH: Mapping[Command, int] = {"compare": 8, "diagnose": 1}
 
 @dataclass(frozen=True)
 class FleetRun:
-    """Outcome of the examination of a fleet's recordings.
+    """Outcome of the examination of a fleet's recordings."""
 
-    Attributes
-    ----------
-    results : one for each recording, in the order in which they were given.
-    kept : how many of them are those of an earlier run.
-    interrupted : whether Ctrl-C ended the work; recordings that were not done have a problem that says so.
-    """
-
-    results: tuple[RecordingResult, ...]
-    kept: int = 0
+    results: tuple[RecordingResult, ...]  #: one for each recording, in the order in which they were given
+    kept: int = 0  #: how many of them are those of an earlier run
+    #: whether Ctrl-C ended the work; recordings that were not done have a problem that says so
     interrupted: bool = False
 
 

@@ -15,20 +15,12 @@ from compd.recording import Sidecar, read_sidecar
 
 @dataclass(frozen=True)
 class FleetRecording:
-    """A recording and the machine that it is of.
+    """A recording and the machine that it is of."""
 
-    Attributes
-    ----------
-    path : its table, absolute.
-    machine : name of the machine among those of the fleet.
-    configuration : name of the machine's configuration, as the sidecar has it; "" if that cannot be read.
-    started_at : when the campaign began, UTC; None if nothing says so.
-    """
-
-    path: Path
-    machine: str
-    configuration: str = ""
-    started_at: datetime | None = None
+    path: Path  #: its table, absolute
+    machine: str  #: name of the machine among those of the fleet
+    configuration: str = ""  #: name of the machine's configuration, as the sidecar has it; "" if that cannot be read
+    started_at: datetime | None = None  #: when the campaign began, UTC; None if nothing says so
 
     def __str__(self) -> str:
         return str(self.path)

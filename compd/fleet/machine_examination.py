@@ -39,22 +39,14 @@ KINEMATICS = {links: kinematics for kinematics, links in LINKS.items()}
 
 @dataclass(frozen=True)
 class Examination:
-    """The examination of each recording of a fleet; called with it, in any process.
+    """The examination of each recording of a fleet; called with it, in any process."""
 
-    Attributes
-    ----------
-    command : "compare" or "diagnose".
-    machines : configurations of machines that do not come with compd.
-    models : model files. A machine without one has no effects.
-    effects : effects of one's own that a diagnosis tries, as `compd.load_effects` takes them.
-    criteria : numbers of the verdicts.  comparison : of the comparisons.
-    """
-
-    command: Command
+    command: Command  #: "compare" or "diagnose"
+    #: configurations of machines that do not come with compd
     machines: MachineFiles = field(default_factory=MachineFiles)
-    models: MachineFiles = field(default_factory=MachineFiles)
-    effects: tuple[str, ...] = ()
-    criteria: Criteria = Criteria()
+    models: MachineFiles = field(default_factory=MachineFiles)  #: model files. A machine without one has no effects.
+    effects: tuple[str, ...] = ()  #: effects of one's own that a diagnosis tries, as `compd.load_effects` takes them.
+    criteria: Criteria = Criteria()  #: numbers of the verdicts.  comparison : of the comparisons.
     comparison: ComparisonCriteria = ComparisonCriteria()
 
     @property

@@ -13,15 +13,11 @@ from compd.fleet.machine_names import PLACEHOLDER, machine_in, matches_of
 
 @dataclass(frozen=True)
 class MachineFiles:
-    """Files of one kind, each for a machine.
+    """Files of one kind, each for a machine."""
 
-    Attributes
-    ----------
-    by_configuration : name of a configuration, as a sidecar has it -> the file for all machines that are built so.
-    by_machine : name of a machine of the fleet -> its own file, which comes first.
-    """
-
+    #: name of a configuration, as a sidecar has it -> the file for all machines that are built so
     by_configuration: Mapping[str, Path] = field(default_factory=dict)
+    #: name of a machine of the fleet -> its own file, which comes first
     by_machine: Mapping[str, Path] = field(default_factory=dict)
 
     @property

@@ -30,29 +30,17 @@ ERROR, ERROR_LEFT = "error", "error with its effects"
 
 @dataclass(frozen=True)
 class OutlyingMachine:
-    """A machine with a value unlike those of all others.
+    """A machine with a value unlike those of all others."""
 
-    Attributes
-    ----------
-    machine : its name.
-    quantity : ERROR, ERROR_LEFT, or a parameter such as "link_expansion.a".
-    value, standard_error : of this machine, in `unit`; the standard error of an error is 0.
-    unit : of value, median and scatter.
-    kinematics : how it and those that it is compared with are built.
-    median : of these machines.
-    machines : number of these machines that have the quantity.
-    score : how far from the median, in robust standard deviations.
-    """
-
-    machine: str
-    quantity: str
-    value: float
+    machine: str  #: its name
+    quantity: str  #: ERROR, ERROR_LEFT, or a parameter such as "link_expansion.a".
+    value: float  #: value, standard_error: of this machine, in `unit`; the standard error of an error is 0
     standard_error: float
-    unit: str
-    kinematics: str
-    median: float
-    machines: int
-    score: float
+    unit: str  #: of value, median and scatter
+    kinematics: str  #: how it and those that it is compared with are built
+    median: float  #: of these machines
+    machines: int  #: number of these machines that have the quantity
+    score: float  #: how far from the median, in robust standard deviations
 
 
 def outlying_machines(

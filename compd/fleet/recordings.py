@@ -22,15 +22,10 @@ _HEADER_BYTES = 16384
 
 @dataclass(frozen=True)
 class FoundRecordings:
-    """Contents of the searched places.
+    """Contents of the searched places."""
 
-    Attributes
-    ----------
-    recordings : in the order of their paths.
-    remarks : what a person may want to know: sidecars without a table, and how the machines were told apart.
-    """
-
-    recordings: tuple[FleetRecording, ...]
+    recordings: tuple[FleetRecording, ...]  #: in the order of their paths
+    #: what a person may want to know: sidecars without a table, and how the machines were told apart
     remarks: tuple[Problem, ...]
 
 

@@ -12,20 +12,13 @@ from compd.fleet.recording_result import RecordingResult
 
 @dataclass(frozen=True)
 class LoneEffect:
-    """An effect that one machine alone has, among enough that are built alike.
+    """An effect that one machine alone has, among enough that are built alike."""
 
-    Attributes
-    ----------
-    machine, effect : which machine, and the effect's id.
-    found_on, recordings : on how many of its recordings.
-    machines : number of machines of this kinematics, with itself.
-    """
-
-    machine: str
+    machine: str  #: machine, effect: which machine, and the effect's id
     effect: str
-    found_on: int
+    found_on: int  #: found_on, recordings: on how many of its recordings
     recordings: int
-    machines: int
+    machines: int  #: number of machines of this kinematics, with itself
 
 
 def steady_effects(

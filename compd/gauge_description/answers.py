@@ -16,35 +16,26 @@ Range = tuple[float, float] | Literal["unknown"]
 
 @dataclass(frozen=True)
 class Answers:
-    """Each is an option of `compd gauge learn`; an omitted one is asked if the replies leave it open.
+    """Each is an option of `compd gauge learn`; an omitted one is asked if the replies leave it open."""
 
-    Attributes
-    ----------
-    units : of the numbers on the wire, one for each channel or one for all; () where the replies say them.
-    names : of the numbers in the replies, SKIPPED for one that is not read; () for "value", or 1, 2 ...
-    ranges : [lowest, highest] that each channel can measure, in the unit that compd gives (mm, degC), or UNKNOWN; one
-        for each channel or one for all.
-    errors : whole error replies without their terminator, and their quality.
-    ignored : letters and signs that may vary beside a number and do not touch its value.
-    factors : words beside a number that multiply it, in the manner of a description: "mm=1|um=0.001", "+=1|-=-1".
-    constants : digits in front of a number that are no part of it: an address.
-    decimals : how many the device shows: digits behind them are skipped; of whole numbers, how many are decimals.
-    decimal_mark : "." or ","; "" if the replies say it.
-    skipped_end : how many characters at the end of every reply are skipped.
-    plain : every digit belongs to its number: no address, checksum or status is glued to it.
-    """
-
+    #: of the numbers on the wire, one for each channel or one for all; () where the replies say them
     units: tuple[str, ...] = ()
+    #: of the numbers in the replies, SKIPPED for one that is not read; () for "value", or 1, 2 ...
     names: tuple[str, ...] = ()
+    #: [lowest, highest] that each channel can measure, in the unit that compd gives (mm, degC), or UNKNOWN; one for
+    #: each channel or one for all
     ranges: tuple[Range, ...] = ()
+    #: whole error replies without their terminator, and their quality
     errors: Mapping[bytes, str] = field(default_factory=dict)
-    ignored: str = ""
+    ignored: str = ""  #: letters and signs that may vary beside a number and do not touch its value
+    #: words beside a number that multiply it, in the manner of a description: "mm=1|um=0.001", "+=1|-=-1".
     factors: tuple[str, ...] = ()
-    constants: tuple[str, ...] = ()
+    constants: tuple[str, ...] = ()  #: digits in front of a number that are no part of it: an address
+    #: how many the device shows: digits behind them are skipped; of whole numbers, how many are decimals
     decimals: int | None = None
-    decimal_mark: str = ""
-    skipped_end: int = 0
-    plain: bool = False
+    decimal_mark: str = ""  #: "." or ","; "" if the replies say it.
+    skipped_end: int = 0  #: how many characters at the end of every reply are skipped
+    plain: bool = False  #: every digit belongs to its number: no address, checksum or status is glued to it
 
 
 def range_of(text: str) -> Range:

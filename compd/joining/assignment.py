@@ -24,22 +24,14 @@ MAX_WITHOUT = 0.05
 
 @dataclass(frozen=True)
 class Assignment:
-    """The dwell of each of G points.
+    """The dwell of each of G points."""
 
-    Attributes
-    ----------
-    dwell : (G,) number of the dwell from 0, -1 for none. rms_mm : of what the distances between the points differ by.
-    limit_mm : points farther from their dwell than this have none.
-    other : (G,) the dwell that each point fits next best, -1 for none.
-    unclear : (G,) points that would fit another dwell as well; they have none in what a search returns.
-    next_best : (by how many dwells all points are shifted, rms in mm), None if there is no other.
-    """
-
-    dwell: IntArray
-    rms_mm: float
-    limit_mm: float
-    other: IntArray
-    unclear: BoolArray
+    dwell: IntArray  #: (G,) number of the dwell from 0, -1 for none
+    rms_mm: float  #: of what the distances between the points differ by
+    limit_mm: float  #: points farther from their dwell than this have none
+    other: IntArray  #: (G,) the dwell that each point fits next best, -1 for none
+    unclear: BoolArray  #: (G,) points that would fit another dwell as well; they have none in what a search returns
+    #: (by how many dwells all points are shifted, rms in mm), None if there is no other
     next_best: tuple[int, float] | None = None
 
     @property
@@ -50,17 +42,12 @@ class Assignment:
 
 @dataclass(frozen=True)
 class NoAssignment:
-    """The reason why there is none.
+    """The reason why there is none."""
 
-    Attributes
-    ----------
-    why : as the `what` of a problem. value, allowed : likewise.
-    point, dwell : the first point that does not fit, and the dwell where it would be in order; None where not known.
-    """
-
-    why: str
-    value: str = ""
+    why: str  #: as the `what` of a problem
+    value: str = ""  #: value, allowed: likewise
     allowed: str = ""
+    #: point, dwell: the first point that does not fit, and the dwell where it would be in order; None where not known
     point: int | None = None
     dwell: int | None = None
 

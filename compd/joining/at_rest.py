@@ -33,36 +33,28 @@ By = Literal["order", "name", "distance"]
 
 @dataclass(frozen=True)
 class RestJoin:
-    """A recording of points at rest, each beside the gauges in its dwell; `write_recording` writes it.
+    """A recording of points at rest, each beside the gauges in its dwell; `write_recording` writes it."""
 
-    Attributes
-    ----------
-    columns, sidecar : of the recording. by : "order", "name" or "distance".
-    dwells : of the recording of gauges. points : of the export. joined : rows, one for each point with a dwell.
-    line, dwell_number : (G,) line of each point in the export, and the number of its dwell from 1; 0 for none.
-    residual_mm : (G,) how far each point is from its dwell once all are laid over the dwells; nan for none.
-    first, last : (line of the export, dwell) of the first and the last pair.
-    rms_mm : root mean square of what the distances between points differ by from those of the machine's kinematics.
-    next_best : (shift in dwells, its rms in mm) of an assignment by order; None if there is no other.
-    left_out : reason -> points or dwells, in words, that are in no row.
-    of_lengths : whether the points are lengths along a link.
-    """
-
-    columns: Mapping[str, FloatArray | TextArray]
+    columns: Mapping[str, FloatArray | TextArray]  #: columns, sidecar: of the recording
     sidecar: Mapping[str, Any]
-    by: By
-    dwells: tuple[Dwell, ...]
-    points: int
-    joined: int
+    by: By  #: "order", "name" or "distance"
+    dwells: tuple[Dwell, ...]  #: of the recording of gauges
+    points: int  #: of the export
+    joined: int  #: rows, one for each point with a dwell
+    #: line, dwell_number: (G,) line of each point in the export, and the number of its dwell from 1; 0 for none
     line: IntArray
     dwell_number: IntArray
+    #: (G,) how far each point is from its dwell once all are laid over the dwells; nan for none
     residual_mm: FloatArray
-    first: tuple[int, Dwell]
+    first: tuple[int, Dwell]  #: first, last: (line of the export, dwell) of the first and the last pair
     last: tuple[int, Dwell]
+    #: root mean square of what the distances between points differ by from those of the machine's kinematics
     rms_mm: float
+    #: (shift in dwells, its rms in mm) of an assignment by order; None if there is no other
     next_best: tuple[int, float] | None = None
+    #: reason -> points or dwells, in words, that are in no row
     left_out: Mapping[str, str] = field(default_factory=dict)
-    of_lengths: bool = False
+    of_lengths: bool = False  #: whether the points are lengths along a link
 
 
 @dataclass(frozen=True)

@@ -20,18 +20,12 @@ _WRONG_SIGMAS = 6.0
 
 @dataclass(frozen=True)
 class NamedAssignment:
-    """The dwell of each of G points by its name.
+    """The dwell of each of G points by its name."""
 
-    Attributes
-    ----------
-    dwell : (G,) number of the dwell from 0, -1 for none.
-    unknown : names that no dwell has. without : ids of dwells that no point has.
-    unclear : names of places visited several times of which it cannot be told when each was measured.
-    """
-
-    dwell: IntArray
-    unknown: tuple[str, ...]
-    without: tuple[str, ...]
+    dwell: IntArray  #: (G,) number of the dwell from 0, -1 for none
+    unknown: tuple[str, ...]  #: names that no dwell has
+    without: tuple[str, ...]  #: ids of dwells that no point has
+    #: names of places visited several times of which it cannot be told when each was measured
     unclear: tuple[str, ...] = ()
 
 

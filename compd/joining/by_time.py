@@ -30,41 +30,27 @@ _INSTANTS = 9
 
 @dataclass(frozen=True)
 class JoinResult:
-    """A recording with the reference that an instrument gives, on one clock; `write_recording` writes it.
+    """A recording with the reference that an instrument gives, on one clock; `write_recording` writes it."""
 
-    Attributes
-    ----------
-    columns, sidecar : of the recording. offset : between the clocks.
-    matched : rows that have a reference now. left_out : reason -> rows without one.
-    still_mm : motion above which a row counts as in motion.
-    """
-
-    columns: Mapping[str, FloatArray | TextArray]
+    columns: Mapping[str, FloatArray | TextArray]  #: columns, sidecar: of the recording
     sidecar: Mapping[str, Any]
-    offset: ClockOffset
-    matched: int
-    left_out: Mapping[str, int]
-    still_mm: float
+    offset: ClockOffset  #: between the clocks
+    matched: int  #: rows that have a reference now
+    left_out: Mapping[str, int]  #: reason -> rows without one
+    still_mm: float  #: motion above which a row counts as in motion
 
 
 @dataclass(frozen=True)
 class Instrument:
-    """A person's statements about the instrument.
+    """A person's statements about the instrument."""
 
-    Attributes
-    ----------
-    frame : of its x, y, z. sigma_um : standard uncertainty per axis; None if it is not known.
-    sigma_urad : standard uncertainty of an attitude about each axis; None if it is not known.
-    link : for a length, the link that it measures (1-based). ball : for a length, the number of the fixed ball, or of
-        another fixed end, from which it is measured to the tip.
-    reflectors : name -> place of each of several reflectors, from the tip along the axes of {P}, mm.
-    """
-
-    frame: Frame = "instrument"
-    sigma_um: float | None = None
-    link: int | None = None
-    sigma_urad: float | None = None
+    frame: Frame = "instrument"  #: of its x, y, z
+    sigma_um: float | None = None  #: standard uncertainty per axis; None if it is not known
+    link: int | None = None  #: for a length, the link that it measures (1-based)
+    sigma_urad: float | None = None  #: standard uncertainty of an attitude about each axis; None if it is not known
+    #: for a length, the number of the fixed ball, or of another fixed end, from which it is measured to the tip
     ball: int | None = None
+    #: name -> place of each of several reflectors, from the tip along the axes of {P}, mm
     reflectors: Mapping[str, Place] = field(default_factory=dict)
 
 

@@ -50,21 +50,16 @@ _BLOCKS = 6
 
 @dataclass(frozen=True)
 class ClockOffset:
-    """recording time = instrument time + offset_s.
-
-    Attributes
-    ----------
-    std_s : standard uncertainty: scatter between blocks of time, and how long the machine dwells (within a
-        dwell no offset is better than another). nan for an offset that a person gave.
-    agreement : share of the instrument's variance that a polynomial of the scales explains, at most 1; nan where
-        too few places were visited.
-    runner_up : (offset_s, agreement) of the next best; None if there is none.
-    """
+    """recording time = instrument time + offset_s."""
 
     offset_s: float
+    #: standard uncertainty: scatter between blocks of time, and how long the machine dwells (within a dwell no offset
+    #: is better than another). nan for an offset that a person gave.
     std_s: float
+    #: share of the instrument's variance that a polynomial of the scales explains, at most 1; nan where too few places
+    #: were visited
     agreement: float
-    runner_up: tuple[float, float] | None = None
+    runner_up: tuple[float, float] | None = None  #: (offset_s, agreement) of the next best; None if there is none
 
 
 @dataclass(frozen=True)

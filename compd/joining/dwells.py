@@ -30,20 +30,12 @@ _QUARTER = 0.3186
 
 @dataclass(frozen=True)
 class Dwell:
-    """Rows of a recording in which the machine stood at one place.
+    """Rows of a recording in which the machine stood at one place."""
 
-    Attributes
-    ----------
-    number : from 1, in the order of time.
-    rows : (R,) positions of the rows in the recording.
-    time_s : (2,) of the first and the last of them; nan in a recording without `time_s`.
-    point : id of the place as the recording has it; "" if it has none.
-    """
-
-    number: int
-    rows: IntArray
-    time_s: tuple[float, float]
-    point: str = ""
+    number: int  #: from 1, in the order of time
+    rows: IntArray  #: (R,) positions of the rows in the recording
+    time_s: tuple[float, float]  #: (2,) of the first and the last of them; nan in a recording without `time_s`
+    point: str = ""  #: id of the place as the recording has it; "" if it has none
 
     @property
     def middle_s(self) -> float:

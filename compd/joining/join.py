@@ -26,23 +26,15 @@ _TRACK_PERIOD_S = 1.0
 
 @dataclass(frozen=True)
 class JoinOptions:
-    """A person's options for a join.
+    """A person's options for a join."""
 
-    Attributes
-    ----------
-    instrument : what gave the reference. by : what puts rows together; None: the time, of a track in time.
-    offset_s : recording time minus instrument time, with "time"; None: estimated from the motion.
-    moving : with "time": rows in motion too. plan : with "name": the plan that was measured.
-    machine : the configuration of the machine, which the joined recording then names; None: the one that the
-        recording names.
-    """
-
-    instrument: Instrument = field(default_factory=Instrument)
-    by: JoinBy | None = None
-    offset_s: float | None = None
-    moving: bool = False
+    instrument: Instrument = field(default_factory=Instrument)  #: what gave the reference
+    by: JoinBy | None = None  #: what puts rows together; None: the time, of a track in time
+    offset_s: float | None = None  #: recording time minus instrument time, with "time"; None: estimated from the motion
+    moving: bool = False  #: with "time": rows in motion too
+    #: the configuration of the machine, which the joined recording then names; None: the one that the recording names
     machine: Path | None = None
-    plan: Path | None = None
+    plan: Path | None = None  #: with "name": the plan that was measured
 
 
 def choose_by(by: JoinBy | None, export: InstrumentExport) -> JoinBy:

@@ -36,25 +36,16 @@ class Library(NamedTuple):
 
 
 class LineDefinition(ABC):
-    """A kind of line.
+    """A kind of line."""
 
-    Attributes
-    ----------
-    kind : as `kind` of a line in the configuration names it.
-    carries : what drivers find on it, as `Gauge.line_kind` has it.
-    settings : its keys in the configuration.
-    order : its place in lists; lower ones come first. Of the kinds that carry the same, the first is taken for a port
-        of the command line that no other claims.
-    library : what must be installed for it; None for compd itself.
-    example_port, example_key : a port and a key of it, as on the command line.
-    """
-
-    kind: ClassVar[str]
-    carries: ClassVar[LineKind]
-    settings: ClassVar[type[LineSettings]]
-    example_port: ClassVar[str]
+    kind: ClassVar[str]  #: as `kind` of a line in the configuration names it
+    carries: ClassVar[LineKind]  #: what drivers find on it, as `Gauge.line_kind` has it.
+    settings: ClassVar[type[LineSettings]]  #: its keys in the configuration
+    example_port: ClassVar[str]  #: example_port, example_key: a port and a key of it, as on the command line
+    #: its place in lists; lower ones come first. Of the kinds that carry the same, the first is taken for a port of the
+    #: command line that no other claims.
     order: ClassVar[int] = 100
-    library: ClassVar[Library | None] = None
+    library: ClassVar[Library | None] = None  #: what must be installed for it; None for compd itself
     example_key: ClassVar[str] = "pause_s=0.02"
 
     @abstractmethod
@@ -89,18 +80,12 @@ class LineDefinition(ABC):
 
 
 class PolledDefinition(LineDefinition):
-    """A kind of line whose gauges are polled.
+    """A kind of line whose gauges are polled."""
 
-    Attributes
-    ----------
-    over_network : whether there is no baud rate, and no damage that a checksum of the network lets through.
-    broadcast_answered : whether a write to unit 0 is answered, as one over Modbus TCP is.
-    tries_drivers : whether `compd gauge test-driver` tries drivers on it.
-    """
-
+    #: whether there is no baud rate, and no damage that a checksum of the network lets through
     over_network: ClassVar[bool]
-    broadcast_answered: ClassVar[bool] = False
-    tries_drivers: ClassVar[bool] = False
+    broadcast_answered: ClassVar[bool] = False  #: whether a write to unit 0 is answered, as one over Modbus TCP is
+    tries_drivers: ClassVar[bool] = False  #: whether `compd gauge test-driver` tries drivers on it
 
     @abstractmethod
     def pace(self, settings: Any, turnaround_s: float | None = None) -> Pace:

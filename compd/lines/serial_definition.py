@@ -23,17 +23,12 @@ MIN_SERIAL_GAP_S = 2e-3
 
 
 class SerialDefinition(PolledDefinition):
-    """A kind of line on a serial port.
-
-    Attributes
-    ----------
-    rtu : whether it keeps the silences of Modbus RTU.
-    """
+    """A kind of line on a serial port."""
 
     over_network = False
     example_port = "/dev/ttyUSB0"
     example_key = "echo=true"
-    rtu: ClassVar[bool] = False
+    rtu: ClassVar[bool] = False  #: whether it keeps the silences of Modbus RTU
 
     def stream(self, settings: SerialPortSettings, clock: Clock, wrap_port: WrapPort) -> StreamLine:
         from compd.lines.control_lines import ControlLines

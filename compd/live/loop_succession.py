@@ -18,12 +18,7 @@ _log = structlog.get_logger()
 
 
 class LoopSuccession:
-    """Starts loops, and knows which of them is the daemon's; used by the supervisor.
-
-    Attributes
-    ----------
-    loop : the one that has the turn.
-    """
+    """Starts loops, and knows which of them is the daemon's; used by the supervisor."""
 
     def __init__(self, process: LoopProcess, clock: Clock, output: int | None) -> None:
         """`output`: where the loops' log goes."""
@@ -34,7 +29,7 @@ class LoopSuccession:
         self._number = 0
         self._starts = 0
         self._last_end = ""
-        self.loop = self._child("loop", lambda: None)
+        self.loop = self._child("loop", lambda: None)  #: the one that has the turn
         self._successor: ChildProcess | None = None
         self._successor_number = 0
         self._retired: list[ChildProcess] = []

@@ -39,15 +39,10 @@ def run(configuration: Configuration) -> bool:
 
 
 class _Successor:
-    """The daemon of the configuration as its file is at SIGHUP.
-
-    Attributes
-    ----------
-    daemon : None until it has been made.
-    """
+    """The daemon of the configuration as its file is at SIGHUP."""
 
     def __init__(self, now: Daemon) -> None:
-        self.daemon: Daemon | None = None
+        self.daemon: Daemon | None = None  #: None until it has been made
         self._now = now
 
     def check(self) -> None:

@@ -72,20 +72,14 @@ Event = Mapping[str, Any]
 
 
 class Broadcast:
-    """The events; used by the event loop's thread alone.
-
-    Attributes
-    ----------
-    history : of the machine; None before the daemon has told what machine it is.
-    moments, traces : the live events of that machine, and what its gauges showed.
-    """
+    """The events; used by the event loop's thread alone."""
 
     def __init__(self, link: DaemonLink, browsers: Browsers, recordings: Recordings) -> None:
         self._link = link
         self._browsers = browsers
         self._recordings = recordings
-        self.history: History | None = None
-        self.moments = Moments()
+        self.history: History | None = None  #: of the machine; None before the daemon has told what machine it is
+        self.moments = Moments()  #: moments, traces: the live events of that machine, and what its gauges showed
         self.traces = Traces(0)
         self._faults = FaultCounts()
         self._model_effects = ModelEffects()

@@ -29,26 +29,19 @@ _log = structlog.get_logger()
 
 @dataclass
 class DaemonLink:
-    """The newest messages of the daemon at `path`, its Unix socket; used by the event loop's thread alone.
-
-    Attributes
-    ----------
-    connected : whether the messages below are of a daemon that is there.
-    reason : why it is not.
-    machine, columns : MACHINE, and the `columns` of WATCH.
-    readings, status, budget, models : the newest of each, `models` of MODEL; None before the first.
-    news : notified with every READINGS, and when the daemon comes or goes.
-    """
+    """The newest messages of the daemon at `path`, its Unix socket; used by the event loop's thread alone."""
 
     path: str
-    connected: bool = False
-    reason: str = "not connected yet"
-    machine: Message | None = None
+    connected: bool = False  #: whether the messages below are of a daemon that is there
+    reason: str = "not connected yet"  #: why it is not
+    machine: Message | None = None  #: machine, columns: MACHINE, and the `columns` of WATCH
     columns: list[Message] = field(default_factory=list)
+    #: readings, status, budget, models: the newest of each, `models` of MODEL; None before the first
     readings: Message | None = None
     status: Message | None = None
     budget: Message | None = None
     models: Message | None = None
+    #: notified with every READINGS, and when the daemon comes or goes
     news: asyncio.Condition = field(default_factory=asyncio.Condition)
 
     async def run(self) -> None:

@@ -18,25 +18,14 @@ MORE = "more below"
 
 @dataclass(frozen=True)
 class LabelledText:
-    """A label and what stands behind it.
+    """A label and what stands behind it."""
 
-    Attributes
-    ----------
-    label : str
-        One word or two.
-    clauses : tuple of str
-        What is said, the most important first; the last are left out where there is no room.
-    names : tuple of str
-        Empty: the clauses follow one another, with semicolons. One for each clause: each clause has a line of its own,
-        and those without room are mentioned by their names.
-    least : int
-        Lines that it has at least.
-    """
-
-    label: str
-    clauses: tuple[str, ...]
+    label: str  #: one word or two
+    clauses: tuple[str, ...]  #: what is said, the most important first; the last are left out where there is no room
+    #: empty: the clauses follow one another, with semicolons. One for each clause: each clause has a line of its own,
+    #: and those without room are mentioned by their names.
     names: tuple[str, ...] = ()
-    least: int = 1
+    least: int = 1  #: lines that it has at least
 
     def lines(self, most: int, width: int) -> list[str]:
         """The text without its label in at most so many lines of so many columns."""

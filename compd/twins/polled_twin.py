@@ -40,18 +40,12 @@ def _no_time(settings: Any) -> float:
 
 @dataclass(frozen=True)
 class PolledTwin:
-    """The far end of a kind of line.
+    """The far end of a kind of line."""
 
-    Attributes
-    ----------
-    end : opens it on this computer. Takes the line's settings, None for a port of this computer; the path at which a
-        serial port appears; and the number of the network port, 0 for any.
-    listener : the devices on the line. Takes the settings and the devices.
-    damages : by name of a fault, what becomes of a reply.
-    character_s : time (s) of a character on the wire, by the settings.
-    """
-
+    #: opens it on this computer. Takes the line's settings, None for a port of this computer; the path at which a
+    #: serial port appears; and the number of the network port, 0 for any.
     end: Callable[[Any, Path, int], End]
-    listener: Callable[[Any, Sequence[Any]], Listener]
+    listener: Callable[[Any, Sequence[Any]], Listener]  #: the devices on the line. Takes the settings and the devices.
+    #: by name of a fault, what becomes of a reply
     damages: Mapping[str, Damage] = field(default_factory=lambda: DAMAGES)
-    character_s: Callable[[Any], float] = _no_time
+    character_s: Callable[[Any], float] = _no_time  #: time (s) of a character on the wire, by the settings

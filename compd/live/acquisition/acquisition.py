@@ -34,14 +34,7 @@ Opener = Callable[[Any, Clock], Line]
 
 
 class LineThread:
-    """The thread of one line: opens it, polls its gauges in turn, and opens it again when it is lost.
-
-    Attributes
-    ----------
-    state, detail : "opening", "open", "lost" or "stopped", and why it is lost.
-    opened, lost : how often the line was opened and lost.
-    gauges : the line's gauges, with the counts of their polls and faults.
-    """
+    """The thread of one line: opens it, polls its gauges in turn, and opens it again when it is lost."""
 
     def __init__(
         self,
@@ -63,11 +56,12 @@ class LineThread:
         `poll_requests`: of clients.
         """
         self.name = name
-        self.state = "opening"
+        self.state = "opening"  #: state, detail: "opening", "open", "lost" or "stopped", and why it is lost
         self.detail = ""
-        self.opened = 0
+        self.opened = 0  #: opened, lost: how often the line was opened and lost
         self.lost = 0
         buffer = None if settings.round_trigger is None else RoundBuffer(latest)
+        #: the line's gauges, with the counts of their polls and faults
         self.gauges = [
             PolledGauge(gauge, driver, buffer or latest, settings.timeout_s, stale_after_s[gauge], clock, trust)
             for gauge, driver in gauges

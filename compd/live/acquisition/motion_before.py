@@ -18,16 +18,11 @@ _ACCELERATION_MARGIN = 2.0
 
 
 class MotionBefore:
-    """The last samples of one length.
-
-    Attributes
-    ----------
-    history : in the order of time; empty before the first.
-    """
+    """The last samples of one length."""
 
     def __init__(self, tolerance_mm: float, limits: MotionLimits) -> None:
         """`tolerance_mm`: by which two readings of the same value may differ. `limits`: of the part's motion."""
-        self.history: deque[GaugeSample] = deque(maxlen=KEPT)
+        self.history: deque[GaugeSample] = deque(maxlen=KEPT)  #: in the order of time; empty before the first
         self._tolerance_mm = tolerance_mm
         self._limits = limits
 

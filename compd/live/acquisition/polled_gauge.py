@@ -51,18 +51,7 @@ class BackOff:
 
 
 class PolledGauge:
-    """One gauge on its line with its slots in `Latest` and its poll counts; used by the line's thread.
-
-    Attributes
-    ----------
-    polls, ok : how often it was asked, but for answers that were thrown away; how often every channel had a value.
-    faults : in how many polls a channel or the whole gauge had each quality.
-    quality, detail : of the last poll.
-    last_ok_s : monotonic time (s) of the last poll in which every channel had a value; nan before.
-    rests_until_s : monotonic time (s) before which it is not asked again.
-    failures : polls that failed as a whole, in a row.
-    reported : whether an exception of its driver is in the log already.
-    """
+    """One gauge on its line with its slots in `Latest` and its poll counts; used by the line's thread."""
 
     def __init__(
         self,
@@ -78,17 +67,19 @@ class PolledGauge:
         readings of each channel that is wired, by "gauge.channel"."""
         self.name = name
         self.driver = driver
+        #: polls, ok: how often it was asked, but for answers that were thrown away; how often every channel had a value
         self.polls = 0
         self.ok = 0
+        #: in how many polls a channel or the whole gauge had each quality
         self.faults: dict[Quality, int] = dict.fromkeys(
             Quality, 0
         )  # all keys from the start, since STATUS reads it on another thread
-        self.quality = Quality.NEVER_READ
+        self.quality = Quality.NEVER_READ  #: quality, detail: of the last poll
         self.detail = ""
-        self.last_ok_s = math.nan
-        self.rests_until_s = -math.inf
-        self.reported = False
-        self.failures = 0
+        self.last_ok_s = math.nan  #: monotonic time (s) of the last poll in which every channel had a value; nan before
+        self.rests_until_s = -math.inf  #: monotonic time (s) before which it is not asked again
+        self.reported = False  #: whether an exception of its driver is in the log already
+        self.failures = 0  #: polls that failed as a whole, in a row
         self._back_off = BackOff(min(timeout_s, MAX_REST_S), MAX_REST_S)
         self._stale_after_s = stale_after_s
         self._latest = latest

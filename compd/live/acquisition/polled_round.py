@@ -79,12 +79,7 @@ NO_REPLY_PENDING = (Quality.LINE_LOST, Quality.DEVICE_ERROR, Quality.SILENT)
 
 
 class PolledRound:
-    """The gauges of one line, polled in turn; used by its thread.
-
-    Attributes
-    ----------
-    duration_s : of the last round of polls, s; nan before the first.
-    """
+    """The gauges of one line, polled in turn; used by its thread."""
 
     def __init__(
         self,
@@ -100,7 +95,7 @@ class PolledRound:
 
         `back_off`: of the line, which every answer ends. `poll_requests`: of clients.
         """
-        self.duration_s = math.nan
+        self.duration_s = math.nan  #: of the last round of polls, s; nan before the first
         self._gauges = gauges
         self._trigger = settings.round_trigger
         self._poll_every_s = settings.poll_every_s

@@ -44,16 +44,11 @@ _DECIMALS_MM = 9
 
 
 class RestScatter:
-    """Scatter of one length in windows of readings.
-
-    Attributes
-    ----------
-    mm : standard deviation of one reading, mm; nan before there are enough.
-    """
+    """Scatter of one length in windows of readings."""
 
     def __init__(self, tolerance_mm: float) -> None:
         """`tolerance_mm`: largest difference of readings at rest."""
-        self.mm = math.nan
+        self.mm = math.nan  #: standard deviation of one reading, mm; nan before there are enough
         self._tolerance_mm = tolerance_mm
         self._times_s: list[float] = []
         self._values_mm: list[float] = []

@@ -25,22 +25,13 @@ _MATRIX = (3, 3)
 
 
 class CarriedField(NamedTuple):
-    """One field of a class whose values are carried.
+    """One field of a class whose values are carried."""
 
-    Attributes
-    ----------
-    field : its name in the class.
-    name : in recordings; it stays as it is when the field is renamed.
-    shape : of an array of float64, as `reshape` takes it; None for any other value.
-    kind : the class of its value where that is carried field by field.
-    may_lack : whether a recording leaves it out where it is None or empty.
-    """
-
-    field: str
-    name: str
-    shape: tuple[int, ...] | None = None
-    kind: type | None = None
-    may_lack: bool = False
+    field: str  #: its name in the class
+    name: str  #: in recordings; it stays as it is when the field is renamed
+    shape: tuple[int, ...] | None = None  #: of an array of float64, as `reshape` takes it; None for any other value
+    kind: type | None = None  #: the class of its value where that is carried field by field
+    may_lack: bool = False  #: whether a recording leaves it out where it is None or empty
 
 
 class CarriedKind(NamedTuple):

@@ -39,13 +39,10 @@ class Commands:
     """What the loop reads at the start of every cycle. Each has one writer, which replaces an immutable value.
 
     Machine zero and target are in shared memory: the service writes them, and the loop reads them in its process.
-
-    Attributes
-    ----------
-    models : those of this process; None is the machine without effects. Other ones come with another loop process.
     """
 
     def __init__(self, zero: MachineZero | StateError, models: Models | None = None) -> None:
+        #: those of this process; None is the machine without effects. Other ones come with another loop process.
         self.models = models
         self._zero = SharedMessage()
         self._target = SharedMessage(_TARGET_BYTES)

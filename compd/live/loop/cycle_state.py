@@ -39,38 +39,29 @@ class CycleState(NamedTuple):
     """What one cycle hands to the next. Nothing in it is ever changed in place.
 
     A recording keeps all fields but two: `zero_vectors` and `models` follow from the inputs of the same cycle.
-
-    Attributes
-    ----------
-    zero : the machine zero that was used last; None before the first. With another one, the cycle forgets what was
-        measured from it.
-    warm_start : where Newton's iterations start, with the memory of the applied model's effects.
-    correction_mm : (n), the correction that is applied; the next one slews from it. An invalid cycle keeps it. Of a
-        machine without scales the correction of its pose (6), mm and rad, after the first valid cycle.
-    last_good : the newest complete set of comparators; None before the first.
-    scales_seen : whether the scales have ever been good. Scales that are lost afterwards are `stop`, not `starting`.
-    shadow_memory : memory of the shadow model's effects.
-    adopting : whether the correction is still slewing towards that of a newly adopted model.
-    tip_noise_um : as `TipUncertainty.by_noise_um`; None where that has not been computed. In recordings of releases up
-        to 0.2.0 (3), without the radius.
-    tip_correction_mm : (n), the correction with which the last tip of CMM mode was computed; None where the last
-        setpoint was invalid or in the other mode.
-    zero_vectors : the readings of `zero`; None where they have yet to be read from it.
-    models : those of the last cycle; None before the first.
-    tip_by_gauge : (3, n + k + 9), by how much a length moves the tip, computed with `tip_noise_um`; None without it.
     """
 
+    #: the machine zero that was used last; None before the first. With another one, the cycle forgets what was measured
+    #: from it.
     zero: MachineZero | None
-    warm_start: WarmStart
+    warm_start: WarmStart  #: where Newton's iterations start, with the memory of the applied model's effects
+    #: (n), the correction that is applied; the next one slews from it. An invalid cycle keeps it. Of a machine without
+    #: scales the correction of its pose (6), mm and rad, after the first valid cycle.
     correction_mm: FloatArray
-    last_good: ComparatorSet | None = None
+    last_good: ComparatorSet | None = None  #: the newest complete set of comparators; None before the first
+    #: whether the scales have ever been good. Scales that are lost afterwards are `stop`, not `starting`.
     scales_seen: bool = False
-    shadow_memory: EffectMemory = EffectMemory()
-    adopting: bool = False
+    shadow_memory: EffectMemory = EffectMemory()  #: memory of the shadow model's effects
+    adopting: bool = False  #: whether the correction is still slewing towards that of a newly adopted model
+    #: as `TipUncertainty.by_noise_um`; None where that has not been computed. In recordings of releases up to 0.2.0
+    #: (3), without the radius.
     tip_noise_um: FloatArray | None = None
+    #: (n), the correction with which the last tip of CMM mode was computed; None where the last setpoint was invalid or
+    #: in the other mode
     tip_correction_mm: FloatArray | None = None
-    zero_vectors: ZeroVectors | None = None
-    models: Models | None = None
+    zero_vectors: ZeroVectors | None = None  #: the readings of `zero`; None where they have yet to be read from it
+    models: Models | None = None  #: those of the last cycle; None before the first
+    #: (3, n + k + 9), by how much a length moves the tip, computed with `tip_noise_um`; None without it
     tip_by_gauge: FloatArray | None = None
 
     @classmethod

@@ -17,18 +17,11 @@ PACKET_LINKS = 6
 
 
 class PacketField(NamedTuple):
-    """One field of the packet.
+    """One field of the packet."""
 
-    Attributes
-    ----------
-    name : of the member in a C struct.
-    format : as `struct` writes it: a count, which may be left out, and a letter.
-    meaning : with its unit, for the reference.
-    """
-
-    name: str
-    format: str
-    meaning: str
+    name: str  #: of the member in a C struct
+    format: str  #: as `struct` writes it: a count, which may be left out, and a letter
+    meaning: str  #: with its unit, for the reference
 
     @property
     def size(self) -> int:

@@ -23,22 +23,13 @@ NO_MODELS = ModelNames({}, {})
 
 
 class SentCycle(NamedTuple):
-    """One cycle, in another process than the one that computed it.
+    """One cycle, in another process than the one that computed it."""
 
-    Attributes
-    ----------
-    inputs : without the models.
-    state_before : from which it was computed, without the models.
-    setpoint_line : the SETPOINT line that it made.
-    models : which models it was computed with.
-    approach : (n) direction in which each link last moved.
-    """
-
-    inputs: CycleInputs
-    state_before: CycleState
-    setpoint_line: bytes
-    models: ModelNames = NO_MODELS
-    approach: tuple[int, ...] = ()
+    inputs: CycleInputs  #: without the models
+    state_before: CycleState  #: from which it was computed, without the models
+    setpoint_line: bytes  #: the SETPOINT line that it made
+    models: ModelNames = NO_MODELS  #: which models it was computed with
+    approach: tuple[int, ...] = ()  #: (n) direction in which each link last moved
 
 
 class CyclePacker:

@@ -45,67 +45,45 @@ _NO_VECTORS: tuple[float, ...] = (math.nan,) * (9 + 3 * PACKET_LINKS)
 
 
 class ShadowResult(NamedTuple):
-    """What the shadow model asks for in the same cycle; nothing of it is applied.
+    """What the shadow model asks for in the same cycle; nothing of it is applied."""
 
-    Attributes
-    ----------
-    model : hash of its file.
-    reason : why there are no values; "" where there are.
-    correction_mm : (n), before the limits.
-    tip_M_mm : (3).
-    tip_P_mm : (3), with the tool on the plate.
-    """
-
-    model: str
-    reason: str
-    correction_mm: FloatArray | None = None
-    tip_M_mm: FloatArray | None = None
-    tip_P_mm: FloatArray | None = None
+    model: str  #: hash of its file
+    reason: str  #: why there are no values; "" where there are
+    correction_mm: FloatArray | None = None  #: (n), before the limits
+    tip_M_mm: FloatArray | None = None  #: (3)
+    tip_P_mm: FloatArray | None = None  #: (3), with the tool on the plate
 
 
 class Setpoint(NamedTuple):
-    """Result of one cycle.
+    """Result of one cycle."""
 
-    Attributes
-    ----------
-    seq : number of the cycle, whether valid or not; a gap is a missed cycle or a dropped message.
-    time_s, valid_until_s : monotonic seconds; an invalid setpoint has expired when it is made.
-    age_s : age of the oldest reading used; nan where none was.
-    state : how it came about.
-    reason : why the state is not ok; "" when it is.
-    mode : what determined the tip.
-    values : the compensation with the correction that is applied, within its limits, and the scale setpoint that
-        belongs to it; its contributions are what each cause asks for, before the limits. None unless valid, so that no
-        value can be taken for a good one, and in a setpoint that `unpack` returned.
-    model : hash of the model file that was applied; "" without effects.
-    inputs, state_before : what it was computed from, for READINGS messages; of them a SETPOINT has the target's time
-        and id.
-    skew_s : how much later than the oldest the newest length that was used was measured; nan where that is not known.
-    u_tip_um : how far the tip may be from the place on the work with the tool on the plate, else from `tip_M_mm`, with
-        95 %; nan where it is not known. Of a recording of a release up to 0.2.0 its standard uncertainty along x, y, z,
-        or None.
-    shadow : result of the model that runs beside the applied one; None without one.
-    tool_on_plate : whether the tool stands on the plate: `tip_P_mm` of the values is the place on the work then.
-    line : its JSON, with the newline. packet : for UDP. Both are b"" but in what `unpack` returned.
-    """
-
-    seq: int
-    time_s: float
+    seq: int  #: number of the cycle, whether valid or not; a gap is a missed cycle or a dropped message
+    time_s: float  #: time_s, valid_until_s: monotonic seconds; an invalid setpoint has expired when it is made
     valid_until_s: float
-    age_s: float
-    state: State
-    reason: str
-    mode: Mode
+    age_s: float  #: age of the oldest reading used; nan where none was
+    state: State  #: how it came about
+    reason: str  #: why the state is not ok; "" when it is
+    mode: Mode  #: what determined the tip
+    #: the compensation with the correction that is applied, within its limits, and the scale setpoint that belongs to
+    #: it; its contributions are what each cause asks for, before the limits. None unless valid, so that no value can be
+    #: taken for a good one, and in a setpoint that `unpack` returned.
     values: Compensation | None
-    model: str = ""
+    model: str = ""  #: hash of the model file that was applied; "" without effects
+    #: inputs, state_before: what it was computed from, for READINGS messages; of them a SETPOINT has the target's time
+    #: and id
     inputs: CycleInputs | None = None
     state_before: CycleState | None = None
+    #: how much later than the oldest the newest length that was used was measured; nan where that is not known
     skew_s: float = math.nan
+    #: how far the tip may be from the place on the work with the tool on the plate, else from `tip_M_mm`, with 95 %;
+    #: nan where it is not known. Of a recording of a release up to 0.2.0 its standard uncertainty along x, y, z, or
+    #: None.
     u_tip_um: float | FloatArray | None = math.nan
-    shadow: ShadowResult | None = None
+    shadow: ShadowResult | None = None  #: result of the model that runs beside the applied one; None without one
+    #: whether the tool stands on the plate: `tip_P_mm` of the values is the place on the work then
     tool_on_plate: bool = False
-    line: bytes = b""
-    packet: bytes = b""
+    line: bytes = b""  #: its JSON, with the newline
+    packet: bytes = b""  #: for UDP. Both are b"" but in what `unpack` returned.
 
     @property
     def valid(self) -> bool:

@@ -21,54 +21,39 @@ _NO_QUANTITIES: Mapping[str, FloatArray] = {}
 
 
 class ComparatorSet(NamedTuple):
-    """Joint and frame comparators of one snapshot, all good. They are used together or not at all.
+    """Joint and frame comparators of one snapshot, all good. They are used together or not at all."""
 
-    Attributes
-    ----------
-    change_mm : (k + 9), joints, then frame, since machine zero.
-    time_s : monotonic time of the snapshot.
-    oldest_s : monotonic time of the oldest reading in the set.
-    quantities : temperatures, forces and the rest that the effects of the applied model need.
-    group_times_s : monotonic times from which joints, frame and quantities are, where they differ; else empty.
-    length_times_s : monotonic times of the oldest and of the newest reading of a length; empty where that is not known.
-    drift_mm_per_s : (k + 9), how fast each moved at most; empty where the bound of the tip's error is not computed, and
-        in a recording of a release up to 0.2.0.
-    scale_mm : (n), where the scales were commanded without compensation; empty where that is not known.
-    """
-
-    change_mm: FloatArray
-    time_s: float
-    oldest_s: float
+    change_mm: FloatArray  #: (k + 9), joints, then frame, since machine zero
+    time_s: float  #: monotonic time of the snapshot
+    oldest_s: float  #: monotonic time of the oldest reading in the set
+    #: temperatures, forces and the rest that the effects of the applied model need
     quantities: Mapping[str, FloatArray] = _NO_QUANTITIES
+    #: monotonic times from which joints, frame and quantities are, where they differ; else empty
     group_times_s: tuple[float, ...] = ()
+    #: monotonic times of the oldest and of the newest reading of a length; empty where that is not known
     length_times_s: tuple[float, ...] = ()
+    #: (k + 9), how fast each moved at most; empty where the bound of the tip's error is not computed, and in a
+    #: recording of a release up to 0.2.0.
     drift_mm_per_s: tuple[float, ...] = ()
+    #: (n), where the scales were commanded without compensation; empty where that is not known
     scale_mm: tuple[float, ...] = ()
 
 
 class UsableComparators(NamedTuple):
-    """The comparators with which to compute.
+    """The comparators with which to compute."""
 
-    Attributes
-    ----------
-    comparators : None where there are none to use; the setpoint is then invalid.
-    state, reason : OK and "", or what replaces the lost comparators and why.
-    expires_s : monotonic time from which `comparators` must not be used any more; inf where they are live.
-    weight : factor between 0 and 1 by which the corrections of the effects are multiplied. `comparators` have been
-        multiplied by it already.
-    held_s : (k + 9), for how long each comparator that is taken from the last good set has not been read; 0 for one
-        that is live. None where all are.
-    absent_mm : (k + 9), what the comparators showed and is not used; None for nothing.
-    beyond : which quantities are beyond the range in which the effects were fitted; None for none.
-    """
-
-    comparators: ComparatorSet | None
-    state: State
+    comparators: ComparatorSet | None  #: None where there are none to use; the setpoint is then invalid
+    state: State  #: state, reason: OK and "", or what replaces the lost comparators and why
     reason: str
-    expires_s: float
+    expires_s: float  #: monotonic time from which `comparators` must not be used any more; inf where they are live
+    #: factor between 0 and 1 by which the corrections of the effects are multiplied. `comparators` have been multiplied
+    #: by it already.
     weight: float = 1.0
+    #: (k + 9), for how long each comparator that is taken from the last good set has not been read; 0 for one that is
+    #: live. None where all are.
     held_s: FloatArray | None = None
-    absent_mm: FloatArray | None = None
+    absent_mm: FloatArray | None = None  #: (k + 9), what the comparators showed and is not used; None for nothing
+    #: which quantities are beyond the range in which the effects were fitted; None for none
     beyond: Beyond | None = None
 
 

@@ -88,24 +88,15 @@ class FittedRanges(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class LiveModel:
-    """A machine model that can be used in the loop.
+    """A machine model that can be used in the loop."""
 
-    Attributes
-    ----------
-    machine : with its effects.
-    quantities : names of the temperatures, forces and so on that its effects need.
-    wires : of these quantities, in the same order.
-    text : its model file; None without effects.
-    ranges : in which each quantity was when the effects were fitted, in the same order; None where that is not known.
-    warnings : what the file does not say of itself.
-    """
-
-    machine: MachineModel
-    quantities: tuple[str, ...]
-    wires: Wires
-    text: ModelText | None = None
+    machine: MachineModel  #: with its effects
+    quantities: tuple[str, ...]  #: names of the temperatures, forces and so on that its effects need
+    wires: Wires  #: of these quantities, in the same order
+    text: ModelText | None = None  #: its model file; None without effects
+    #: in which each quantity was when the effects were fitted, in the same order; None where that is not known
     ranges: FittedRanges | None = None
-    warnings: tuple[Problem, ...] = ()
+    warnings: tuple[Problem, ...] = ()  #: what the file does not say of itself
 
     @cached_property
     def needed_at_zero(self) -> frozenset[str]:

@@ -153,16 +153,7 @@ def _fault(wire: Wire, reading: Reading, now_s: float) -> GaugeFault | None:
 
 
 class MachineWires:
-    """The wiring of one configuration.
-
-    Attributes
-    ----------
-    scale : in the order of the links.
-    joint, frame : the two parts of the comparators.
-    lengths : scales, joint and frame comparators.
-    comparators : first the k = `joints` joint comparators, then those of t1..t3 and u1..u6 of the frame.
-    tool_on_plate : whether the tool stands on the plate and the moving platform carries the work.
-    """
+    """The wiring of one configuration."""
 
     def __init__(self, configuration: Configuration, latest: Latest) -> None:
         wiring = configuration.wiring
@@ -184,7 +175,8 @@ class MachineWires:
 
         frame: dict[str, FrameWire] = {entry.distance: entry for entry in wiring.frame}
         scale = sorted(wiring.scale, key=lambda entry: entry.link)
-        self.scale = Wires([wire(w.gauge, f"scale {w.link}", w.sign) for w in scale])
+        self.scale = Wires([wire(w.gauge, f"scale {w.link}", w.sign) for w in scale])  #: in the order of the links
+        #: first the k = `joints` joint comparators, then those of t1..t3 and u1..u6 of the frame.
         self.comparators = Wires(
             [
                 *(wire(w.gauge, f"joint {k}", w.sign) for k, w in enumerate(wiring.joint, start=1)),
@@ -192,11 +184,12 @@ class MachineWires:
             ]
         )
         self.joints = len(wiring.joint)
-        self.joint = self.comparators.part(0, self.joints)
+        self.joint = self.comparators.part(0, self.joints)  #: joint, frame: the two parts of the comparators
         self.frame = self.comparators.part(self.joints, len(self.comparators.wires))
+        #: whether the tool stands on the plate and the moving platform carries the work
         self.tool_on_plate = configuration.external is None and configuration.geometry.tool.on == "plate"
         self._quantities = {q.name: wire(q.gauge, q.name) for q in wiring.quantities}
-        self.lengths = Wires([*self.scale.wires, *self.comparators.wires])
+        self.lengths = Wires([*self.scale.wires, *self.comparators.wires])  #: scales, joint and frame comparators
 
     @property
     def length_channels(self) -> tuple[str, ...]:

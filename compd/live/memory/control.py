@@ -30,30 +30,24 @@ class Control:
 
     Loops are numbered. The one whose number is `turn` cycles. Another one that is ready to take over is `successor`:
     the loop that has the turn gives it between two ticks.
-
-    Attributes
-    ----------
-    loop_fault : (monotonic time in s, text) of the last end of a loop, for the reason of a `stop`. Written by the
-        supervisor.
-    realtime : what the system granted to the loop. Written by the loop that has the turn.
-    processes : STATUS's part about the processes. Written by the supervisor.
-    headline : one line about the machine's state, for the service manager. Written by the service.
-    model_request : (number, text of a model file or None, whether as the shadow, hash of a shadow to apply or "").
-        Written by the service.
-    model_answer : (number, summary of the models, "") or (number, None, why not). Written by the successor; by the
-        supervisor where that has ended.
-    supervisor_woken, turn_given : event descriptors.
     """
 
     def __init__(self) -> None:
         self._words = shared_counters(4)
         self._ending = SharedMessage(_TEXT_BYTES)
+        #: (monotonic time in s, text) of the last end of a loop, for the reason of a `stop`. Written by the supervisor.
         self.loop_fault = SharedMessage(_TEXT_BYTES)
-        self.realtime = SharedMessage()
-        self.processes = SharedMessage()
+        self.realtime = SharedMessage()  #: what the system granted to the loop. Written by the loop that has the turn.
+        self.processes = SharedMessage()  #: STATUS's part about the processes. Written by the supervisor.
+        #: one line about the machine's state, for the service manager. Written by the service.
         self.headline = SharedMessage(_TEXT_BYTES)
+        #: (number, text of a model file or None, whether as the shadow, hash of a shadow to apply or ""). Written by
+        #: the service.
         self.model_request = SharedMessage(MAX_BYTES + _USUAL_BYTES)
+        #: (number, summary of the models, "") or (number, None, why not). Written by the successor; by the supervisor
+        #: where that has ended.
         self.model_answer = SharedMessage()
+        #: supervisor_woken, turn_given: event descriptors
         self.supervisor_woken = os.eventfd(0, os.EFD_NONBLOCK | os.EFD_CLOEXEC)
         self.turn_given = os.eventfd(0, os.EFD_NONBLOCK | os.EFD_CLOEXEC)
 

@@ -19,16 +19,10 @@ _TRIES = 2
 
 
 class Snapshot(NamedTuple):
-    """The readings that one cycle uses.
+    """The readings that one cycle uses."""
 
-    Attributes
-    ----------
-    time_s : monotonic time (s) at which the snapshot was taken.
-    readings : one of every channel, in the order of `Latest.channels`; each has its own time and quality.
-    """
-
-    time_s: float
-    readings: Readings
+    time_s: float  #: monotonic time (s) at which the snapshot was taken
+    readings: Readings  #: one of every channel, in the order of `Latest.channels`; each has its own time and quality.
 
 
 class Latest:

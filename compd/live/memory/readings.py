@@ -160,15 +160,11 @@ class Readings(Sequence[Reading]):
     """The readings of all channels at one time, in the order of `Latest.channels`; they do not change.
 
     They stay as bytes, of which a `Reading` is made when somebody asks for it: a cycle computes with `slots`.
-
-    Attributes
-    ----------
-    image : the bytes, one slot after the other.
     """
 
     def __init__(self, image: bytes) -> None:
         """`image`: slots whose checksums fit."""
-        self.image = image
+        self.image = image  #: the bytes, one slot after the other
 
     @classmethod
     def of(cls, readings: Iterable[Reading]) -> Self:

@@ -35,17 +35,12 @@ _MARGIN = 16
 
 
 class SharedRing:
-    """A ring. One loop writes it at any time; whoever reads keeps count of what has been read.
-
-    Attributes
-    ----------
-    longest_content : bytes that an entry may have.
-    """
+    """A ring. One loop writes it at any time; whoever reads keeps count of what has been read."""
 
     def __init__(self, channels: int = 0) -> None:
         """`channels`: of the machine, whose readings an entry may have."""
         self._place_bytes = max(_MIN_PLACE_BYTES, channels * _CHANNEL_BYTES)
-        self.longest_content = self._place_bytes - _HEADER_BYTES
+        self.longest_content = self._place_bytes - _HEADER_BYTES  #: bytes that an entry may have
         memory = memoryview(shared_memory(_HEAD_BYTES + ENTRIES * self._place_bytes))
         self._count = memory[:8].cast("Q")
         self._due_s = memory[8:16].cast("d")
@@ -109,16 +104,11 @@ class SharedRing:
 
 
 class RingReader:
-    """Reads a ring from the oldest entry on that it has.
-
-    Attributes
-    ----------
-    dropped : entries that the ring no longer had when they were to be read.
-    """
+    """Reads a ring from the oldest entry on that it has."""
 
     def __init__(self, ring: SharedRing) -> None:
         self.ring = ring
-        self.dropped = 0
+        self.dropped = 0  #: entries that the ring no longer had when they were to be read
         self._next = 0
 
     def contents(self, is_due: Callable[[float, int], bool]) -> Iterator[bytes]:

@@ -21,12 +21,7 @@ _STATUS_BYTES = 1024 * 1024
 
 
 class AcquisitionProcess:
-    """One process that polls some of the machine's lines.
-
-    Attributes
-    ----------
-    name : "acquisition", or "line" with the name of a line that has a process of its own.
-    """
+    """One process that polls some of the machine's lines."""
 
     def __init__(
         self,
@@ -43,7 +38,7 @@ class AcquisitionProcess:
         `priority`: real-time priority of the lines' threads, below the loop's and the service's; 0 for none. `look`:
         called with the time (s) every `LOOK_EVERY_S`, for the votes of the gauges.
         """
-        self.name = name
+        self.name = name  #: "acquisition", or "line" with the name of a line that has a process of its own
         self._make = make
         self._control = control
         self._clock = clock

@@ -53,17 +53,11 @@ class Heartbeat:
 
 
 class RestartDelay:
-    """When a process that has ended is started anew: at once the first time, then after waits that double.
-
-    Attributes
-    ----------
-    due_s : monotonic time (s) of the next start; inf while nothing waits for one.
-    failures : how often in a row it has ended soon after its start.
-    """
+    """When a process that has ended is started anew: at once the first time, then after waits that double."""
 
     def __init__(self) -> None:
-        self.due_s = math.inf
-        self.failures = 0
+        self.due_s = math.inf  #: monotonic time (s) of the next start; inf while nothing waits for one
+        self.failures = 0  #: how often in a row it has ended soon after its start
 
     def ended(self, started_s: float, now_s: float) -> None:
         """The process that was started at `started_s` has ended at `now_s` (s)."""

@@ -70,14 +70,7 @@ class RecordingLimits:
 
 
 class Recorder:
-    """Writes a recording. Lines come from the thread that reads the socket; a thread of the recorder writes them.
-
-    Attributes
-    ----------
-    missing : cycles whose message never came, where every cycle was asked for.
-    dropped : messages that were not written because the disk stalled.
-    without_zero : messages of a daemon that has started anew and has no machine zero: from nothing a column can count.
-    """
+    """Writes a recording. Lines come from the thread that reads the socket; a thread of the recorder writes them."""
 
     def __init__(
         self,
@@ -102,8 +95,9 @@ class Recorder:
             raise RecordingError.of(
                 str(existing[0]), "is there already", next_step="choose another name, or move it away"
             )
-        self.dropped = 0
-        self.missing = 0
+        self.dropped = 0  #: messages that were not written because the disk stalled
+        self.missing = 0  #: cycles whose message never came, where every cycle was asked for
+        #: messages of a daemon that has started anew and has no machine zero: from nothing a column can count
         self.without_zero = 0
         self._name = name
         self._first_messages = (version, watch)

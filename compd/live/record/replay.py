@@ -61,15 +61,7 @@ class ReplayedCycle(NamedTuple):
 
 
 class RecordedCycles:
-    """The cycles in all parts of a recording, oldest first.
-
-    Attributes
-    ----------
-    torn_lines : how many lines were cut off by a kill.
-    version : the VERSION message of the part that is being read; {} before the first.
-    orders : the ORDER messages among the cycles that have been read: who ordered what meanwhile; none of daemons up to
-        0.3.0.
-    """
+    """The cycles in all parts of a recording, oldest first."""
 
     def __init__(self, name: Path) -> None:
         """`name`: as it was given to the recorder, for all parts; or that of one part, with or without a suffix.
@@ -81,8 +73,10 @@ class RecordedCycles:
             stem = stem.removesuffix(suffix)
         path = name.with_name(stem + CYCLES_SUFFIX)
         self.paths = [path] if path.is_file() else sorted(name.parent.glob(f"{stem}-[0-9]*{CYCLES_SUFFIX}"))
-        self.torn_lines = 0
-        self.version: Message = {}
+        self.torn_lines = 0  #: how many lines were cut off by a kill
+        self.version: Message = {}  #: the VERSION message of the part that is being read; {} before the first
+        #: the ORDER messages among the cycles that have been read: who ordered what meanwhile; none of daemons up to
+        #: 0.3.0.
         self.orders: list[Message] = []
         if not self.paths:
             raise RecordingError.of(

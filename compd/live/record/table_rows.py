@@ -16,12 +16,7 @@ Message = Mapping[str, Any]
 
 
 class TableRows:
-    """The rows of one part.
-
-    Attributes
-    ----------
-    names : of the columns. in_full : those that are written with every digit.
-    """
+    """The rows of one part."""
 
     def __init__(self, watch: Message, first_readings: Message, origin_s: float) -> None:
         """`watch`: the daemon's answer to WATCH. `first_readings`: the first READINGS of the part. `origin_s`:
@@ -35,7 +30,8 @@ class TableRows:
         self._model: Sequence[str] = watch.get("model_columns", ())
         self._rotation_B0_rad: Sequence[float] | None = watch.get("rotation_B0_in_M_rad")
         self._decimals |= {name: decimals(name) for name in self._model}
-        self.names = [*of_gauges, *approach_columns(self._links), *self._model]
+        self.names = [*of_gauges, *approach_columns(self._links), *self._model]  #: of the columns
+        #: those that are written with every digit
         self.in_full = {column["column"] for column in self._columns if "sign" not in column}
 
     def row(self, message: Message) -> Row:

@@ -16,13 +16,7 @@ _OTHER_PATH = "give a path in a directory that the daemon's user may write, at w
 
 
 class Listeners:
-    """The sockets on which one configuration asks to listen; they stay open while the processes behind them change.
-
-    Attributes
-    ----------
-    tcp : None where TCP is not configured.
-    unix : for clients of this computer.
-    """
+    """The sockets on which one configuration asks to listen; they stay open while the processes behind them change."""
 
     def __init__(self, settings: SocketSettings, before: Listeners | None = None) -> None:
         """`before`: those of the configuration until now, of which sockets at the same address are taken over.
@@ -31,11 +25,11 @@ class Listeners:
         """
         self._settings = settings
         self._file: tuple[int, int]
-        self.unix: socket.socket
+        self.unix: socket.socket  #: for clients of this computer
         old = before._settings if before is not None else None
         same_unix = old is not None and old.unix.path == settings.unix.path
         same_tcp = old is not None and old.tcp == settings.tcp
-        self.tcp: socket.socket | None = None
+        self.tcp: socket.socket | None = None  #: None where TCP is not configured
         if settings.tcp is not None:
             kept = before.tcp if before is not None and same_tcp else None
             self.tcp = kept or listen_tcp(settings.tcp.host, settings.tcp.port)

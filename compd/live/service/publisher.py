@@ -43,12 +43,7 @@ _log = structlog.get_logger()
 
 
 class Publisher:
-    """Serves the clients of the Unix socket and, where configured, of TCP.
-
-    Attributes
-    ----------
-    dropped_clients : that were too far behind.
-    """
+    """Serves the clients of the Unix socket and, where configured, of TCP."""
 
     def __init__(
         self,
@@ -83,7 +78,7 @@ class Publisher:
         self._requests: Requests  # likewise: it needs the publisher's own figures for STATUS
         self._due_s = dict.fromkeys(Stream, math.inf)
         self._last_state = -1
-        self.dropped_clients = 0
+        self.dropped_clients = 0  #: that were too far behind
 
     def run(self, requests: Requests, keep_on: Callable[[], bool], each_round: Callable[[], None]) -> None:
         """Serve on this thread, as long as `keep_on`. `each_round` is called at least every `LoopWatch.limit_s`."""

@@ -25,18 +25,12 @@ from compd.text import omit_unknown
 class RecordedCycle(NamedTuple):
     """A READINGS message read back.
 
-    Attributes
-    ----------
-    state : the state that the cycle had from the one before it.
-    inputs : what the cycle computed from.
-    setpoint_line : the SETPOINT line that it made, with its newline.
-
     The models are None in both: the message has their hashes only.
     """
 
-    state: CycleState
-    inputs: CycleInputs
-    setpoint_line: bytes
+    state: CycleState  #: the state that the cycle had from the one before it
+    inputs: CycleInputs  #: what the cycle computed from
+    setpoint_line: bytes  #: the SETPOINT line that it made, with its newline
 
 
 class ReadingsMessage:

@@ -91,13 +91,7 @@ class Errands:
 
 
 class RequestContext:
-    """What a request may use to answer; on the publisher's thread, the only writer of `commands.target`.
-
-    Attributes
-    ----------
-    version, machine : these messages as lines.
-    controller : the client that gives targets; None for none.
-    """
+    """What a request may use to answer; on the publisher's thread, the only writer of `commands.target`."""
 
     def __init__(
         self,
@@ -114,11 +108,11 @@ class RequestContext:
         who reaches it."""
         self.messages = messages
         self.errands = errands
-        self.version = line(messages.version)
+        self.version = line(messages.version)  #: version, machine: these messages as lines
         self.machine = line(messages.machine)
         self.target_keys = target_keys
         self.commands = commands
-        self.controller: ClientSession | None = None
+        self.controller: ClientSession | None = None  #: the client that gives targets; None for none
         self._targets = targets or TargetSettings()
         self.access = access
         self.clock = clock or MonotonicClock()

@@ -22,33 +22,22 @@ from compd.units import UM_PER_MM
 
 @dataclass(frozen=True, kw_only=True)
 class StatusReport:
-    """Collects the STATUS message from the daemon's parts, of which it changes none; on the publisher's thread.
+    """Collects the STATUS message from the daemon's parts, of which it changes none; on the publisher's thread."""
 
-    Attributes
-    ----------
-    version : the VERSION message, whose keys STATUS repeats.
-    latest, wires, commands, adopted, timing, control, publisher : the daemon's own.
-    own_time : how long own kinematics takes; None for machines that compd knows.
-    packets : the UDP sender, where one is configured.
-    lines : makes the state of every line, by name.
-    trust : what is known of the length channels.
-    ports : the lasting name of each gauge's port.
-    """
-
-    version: Mapping[str, Any]
-    latest: Latest
+    version: Mapping[str, Any]  #: the VERSION message, whose keys STATUS repeats
+    latest: Latest  #: latest, wires, commands, adopted, timing, control, publisher: the daemon's own
     wires: MachineWires
     commands: Commands
     adopted: AdoptedModels
     timing: LoopTiming
     control: Control
     publisher: Publisher
-    packets: UdpSender | None
-    lines: Callable[[], Mapping[str, Any]]
-    trust: TrustMemory
+    packets: UdpSender | None  #: the UDP sender, where one is configured
+    lines: Callable[[], Mapping[str, Any]]  #: makes the state of every line, by name
+    trust: TrustMemory  #: what is known of the length channels
     clock: Clock
-    ports: Mapping[str, str]
-    own_time: Histogram | None = None
+    ports: Mapping[str, str]  #: the lasting name of each gauge's port
+    own_time: Histogram | None = None  #: how long own kinematics takes; None for machines that compd knows
 
     def message(self) -> dict[str, Any]:
         """The message as plain data; what is unknown is left out."""

@@ -26,17 +26,7 @@ _libc = ctypes.CDLL(None, use_errno=True)
 
 
 class ChildProcess:
-    """One process, which may be started again when it has ended.
-
-    Attributes
-    ----------
-    name : for STATUS, the log and `ps`.
-    pid, pidfd : of the process that runs; 0 and -1 where none does.
-    starts : how often it was started.
-    last_end : how it ended last; "" before.
-    succeeded : whether it ended by itself and had done what it was for.
-    started_s : monotonic time (s) of its last start.
-    """
+    """One process, which may be started again when it has ended."""
 
     def __init__(
         self,
@@ -48,14 +38,14 @@ class ChildProcess:
     ) -> None:
         """`run`: what the process does; it ends when this returns. `output`: descriptor to which everything goes that
         it prints; None is the supervisor's own. `keeps_sockets`: whether it has the sockets that are open now."""
-        self.name = name
-        self.pid = 0
+        self.name = name  #: for STATUS, the log and `ps`
+        self.pid = 0  #: pid, pidfd: of the process that runs; 0 and -1 where none does
         self.pidfd = -1
-        self.starts = 0
-        self.last_end = ""
+        self.starts = 0  #: how often it was started
+        self.last_end = ""  #: how it ended last; "" before
         self._killed_because = ""
-        self.succeeded = False
-        self.started_s = 0.0
+        self.succeeded = False  #: whether it ended by itself and had done what it was for
+        self.started_s = 0.0  #: monotonic time (s) of its last start
         self._run = run
         self._clock = clock
         self._output = output

@@ -26,22 +26,14 @@ _WRITING = threading.Lock()
 
 
 class OwnEffects:
-    """The effects in one file, which may be missing.
-
-    Attributes
-    ----------
-    effects : by id; none where the file has a mistake.
-    declarations : by id, as the file has them.
-    problems : what is wrong with the file.
-    version : counts how often the file was read.
-    """
+    """The effects in one file, which may be missing."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        self.effects: Mapping[str, Effect] = {}
-        self.declarations: Mapping[str, Declaration] = {}
-        self.problems: tuple[Problem, ...] = ()
-        self.version = 0
+        self.effects: Mapping[str, Effect] = {}  #: by id; none where the file has a mistake
+        self.declarations: Mapping[str, Declaration] = {}  #: by id, as the file has them
+        self.problems: tuple[Problem, ...] = ()  #: what is wrong with the file
+        self.version = 0  #: counts how often the file was read
         self._stamp: tuple[int, int] | None = None
         self.reload()
 

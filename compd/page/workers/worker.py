@@ -76,13 +76,6 @@ class Worker:
     """Its process starts with the first question. After its end the next question starts another.
 
     It ends when idle, killed or beyond a limit; its successor opens the state again.
-
-    Attributes
-    ----------
-    name : of what it works on, for people.
-    kept : plain data that the state told last, from which another goes on in its place; None before the first answer.
-    used_s : when it was used last, on a monotonic clock.
-    token : whose question it has answered last, or works on.
     """
 
     def __init__(
@@ -91,10 +84,11 @@ class Worker:
         """starter : starts its process. opening, arguments : see `worker_process.serve`."""
         self._starter, self._limits = starter, limits
         self._opening, self._arguments = opening, arguments
-        self.name = name
+        self.name = name  #: of what it works on, for people
+        #: plain data that the state told last, from which another goes on in its place; None before the first answer
         self.kept: Any = None
-        self.used_s = time.monotonic()
-        self.token: Token | None = None
+        self.used_s = time.monotonic()  #: when it was used last, on a monotonic clock
+        self.token: Token | None = None  #: whose question it has answered last, or works on
         self._changed = threading.Condition()
         self._waiting: deque[Asked] = deque()
         self._current: Asked | None = None

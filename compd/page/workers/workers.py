@@ -117,12 +117,7 @@ _STARTER = ThreadPoolExecutor(1, "workers")
 
 
 class Workers:
-    """All workers.
-
-    Attributes
-    ----------
-    starting : held by the worker's thread that makes room and starts a process; the first waits for what is imported.
-    """
+    """All workers."""
 
     def __init__(self, most: int = MAX_PROCESSES) -> None:
         """most : limit of processes at once."""
@@ -131,6 +126,7 @@ class Workers:
         self._workers: weakref.WeakSet[Worker] = weakref.WeakSet()
         self._temporary: str | None = None
         self._lock = threading.Lock()
+        #: held by the worker's thread that makes room and starts a process; the first waits for what is imported
         self.starting = threading.Lock()
 
     def prepare(self) -> None:

@@ -80,11 +80,6 @@ class Cause:
     remembers_readings : its memory holds readings, so that it depends on when the gauges are read.
     acts_on_frame : it acts on the plate, or on what measures the frame, which a machine may not have.
     acts_on_joint_comparators : it acts on them alone, which a machine may not have.
-
-    Attributes
-    ----------
-    strength : in `unit` (its reciprocal where `stated_as_reciprocal`). mechanism : the machine as drawn.
-    part_strengths : strength of every single part (link, coordinate), any shape, in `unit`.
     """
 
     acts_on_frame: ClassVar[bool] = False
@@ -102,8 +97,9 @@ class Cause:
 
     def __init__(self, strength: float, mechanism: Mechanism, rng: np.random.Generator) -> None:
         """`rng`: for scatter from part to part. The same seed gives the same parts at every strength."""
-        self.strength = strength
-        self.mechanism = mechanism
+        self.strength = strength  #: in `unit` (its reciprocal where `stated_as_reciprocal`)
+        self.mechanism = mechanism  #: the machine as drawn
+        #: strength of every single part (link, coordinate), any shape, in `unit`
         self.part_strengths: FloatArray = np.array([strength])
 
     @classmethod

@@ -30,27 +30,16 @@ class WiredLength(NamedTuple):
 
 
 class MachineView(NamedTuple):
-    """The gauges at one time.
+    """The gauges at one time."""
 
-    Attributes
-    ----------
-    now_s : monotonic time, s.
-    memory : of the channels, with how often each has repeated its digits.
-    wired : what each channel measures, (n): lengths, then quantities.
-    value : (n), as read, mm; of quantities in their unit. believed : (n), whether it is.
-    change : (n), mm since machine zero, with its sign; nan without a machine zero, and of quantities.
-    quantities : temperatures and the rest that are good, by name.
-    setpoint : the newest SETPOINT message; None before the first.
-    """
-
-    now_s: float
-    memory: TrustMemory
-    wired: tuple[WiredLength, ...]
-    value: FloatArray
-    believed: npt.NDArray[np.bool_]
-    change: FloatArray
-    quantities: Mapping[str, float]
-    setpoint: Mapping[str, Any] | None
+    now_s: float  #: monotonic time, s
+    memory: TrustMemory  #: of the channels, with how often each has repeated its digits
+    wired: tuple[WiredLength, ...]  #: what each channel measures, (n): lengths, then quantities
+    value: FloatArray  #: (n), as read, mm; of quantities in their unit
+    believed: npt.NDArray[np.bool_]  #: (n), whether it is
+    change: FloatArray  #: (n), mm since machine zero, with its sign; nan without a machine zero, and of quantities
+    quantities: Mapping[str, float]  #: temperatures and the rest that are good, by name
+    setpoint: Mapping[str, Any] | None  #: the newest SETPOINT message; None before the first
 
     def of_unit(self, unit: str) -> list[int]:
         """The quantities of this unit."""
