@@ -12,7 +12,7 @@ import numpy as np
 from compd.arrays import FloatArray, IntArray
 from compd.calibration.held_out import FEWEST_ROWS, PARTS
 from compd.calibration.jacobian import pose_columns, rigid_columns, without
-from compd.calibration.parameters import Parameters, calibration_parameters
+from compd.calibration.parameters import calibration_parameters
 from compd.calibration.pose_candidates import (
     Box,
     PoseCandidates,
@@ -86,6 +86,8 @@ class CalibrationPlan:
 class PoseStudy:
     """A machine, what is measured of its poses, and what sets of poses are worth.
 
+    parameters : the numbers of the drawing.
+
     Example::
 
         study = PoseStudy(model, "position", Noise(5.0))
@@ -108,10 +110,10 @@ class PoseStudy:
         self.box = reachable_box(model, stroke_mm) if box is None else box
         self._measured, self._noise = measured, noise
         self.candidates = reachable(model, candidate_poses(model, self.box, CANDIDATES), stroke_mm)
-        self._parameters = calibration_parameters(model, self.candidates.rows)
+        self.parameters = calibration_parameters(model, self.candidates.rows)
         judged = reachable(model, even_poses(model, self.box, _JUDGED, _JUDGED_SEED), stroke_mm).rows
         zero_M_mm = model.zero.contact.tip_M_mm
-        moved = pose_columns(model, judged, self._parameters)[:, :3]
+        moved = pose_columns(model, judged, self.parameters)[:, :3]
         self._judged = without(
             moved.reshape(-1, moved.shape[2]), rigid_columns(judged.tip_M_mm, zero_M_mm).reshape(-1, 6)
         ).reshape(moved.shape)
@@ -120,14 +122,9 @@ class PoseStudy:
         self._everything = everything
         self._told = told_directions(_projected([everything]))
 
-    @property
-    def parameters(self) -> Parameters:
-        """The numbers of the drawing."""
-        return self._parameters
-
     def information(self, rows: Observations) -> Information:
         """What poses tell, over the noise."""
-        columns = pose_columns(self.model, rows, self._parameters)
+        columns = pose_columns(self.model, rows, self.parameters)
         tip = (
             np.concatenate([columns[:, :3], rigid_columns(rows.tip_M_mm, self.model.zero.contact.tip_M_mm)], axis=2)
             * UM_PER_MM
@@ -169,8 +166,8 @@ class PoseStudy:
             measured=self._measured,
             observability=self.observability(poses),
             tip_std_um=self.tip_std_um(poses),
-            tip_prior_um=self._tip_um(np.eye(len(self._parameters.names))),
-            numbers=len(self._parameters.names),
+            tip_prior_um=self._tip_um(np.eye(len(self.parameters.names))),
+            numbers=len(self.parameters.names),
         )
 
     def tip_std_um(self, poses: PoseCandidates) -> float:

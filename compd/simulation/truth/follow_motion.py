@@ -32,14 +32,16 @@ class FollowMotion:
     There is no limit of speed: that is the controller's matter, and a jump of its commands must be seen as one. Only
     the stream's own pauses, which a wire to a drive does not have, are smoothed: time on the controller's clock passes
     more slowly when few commands are left.
+
+    position_mm, speeds_mm_per_s : (n,) of the scales, now.
     """
 
     point = None
 
     def __init__(self, start_mm: FloatArray) -> None:
         """start_mm : (n,) positions of the links until the first command."""
-        self._here_mm = start_mm
-        self._speeds_mm_per_s: FloatArray = np.zeros_like(start_mm)
+        self.position_mm = start_mm
+        self.speeds_mm_per_s: FloatArray = np.zeros_like(start_mm)
         self._time_s: float | None = None  # progress of the motion on the controller's clock
         self._before: MotorCommand | None = None
         self._ahead: deque[MotorCommand] = deque()
@@ -54,18 +56,8 @@ class FollowMotion:
             self._ahead.append(command)
 
     @property
-    def position_mm(self) -> FloatArray:
-        """(n,) scale positions."""
-        return self._here_mm
-
-    @property
-    def speeds_mm_per_s(self) -> FloatArray:
-        """(n,) speeds."""
-        return self._speeds_mm_per_s
-
-    @property
     def phase(self) -> Phase:
-        return "moving" if float(np.abs(self._speeds_mm_per_s).max()) > STANDING_MM_PER_S else "dwelling"
+        return "moving" if float(np.abs(self.speeds_mm_per_s).max()) > STANDING_MM_PER_S else "dwelling"
 
     def advance(self, time_s: float) -> float:
         """Advance by `time_s`; returns how many seconds of it the links moved."""
@@ -80,5 +72,5 @@ class FollowMotion:
         if self._ahead and self._time_s > self._before.time_s:
             share = (self._time_s - self._before.time_s) / (self._ahead[0].time_s - self._before.time_s)
             here_mm = here_mm + share * (self._ahead[0].scale_mm - here_mm)
-        self._speeds_mm_per_s, self._here_mm = (here_mm - self._here_mm) / time_s, here_mm
+        self.speeds_mm_per_s, self.position_mm = (here_mm - self.position_mm) / time_s, here_mm
         return time_s if self.phase == "moving" else 0.0

@@ -82,16 +82,16 @@ class World:
         self._speedup = speedup
         self._drives = drives
         self.zero_hold_s = zero_hold_s
-        self._mechanism = Mechanism(geometry)
+        self.mechanism = Mechanism(geometry)
         self._causes = tuple(causes)
         self._weather = weather or Weather(self._strengths.room_swing_K, weather_rng, air_at_zero)
-        self._warm = WarmUp(self._mechanism.links, self._weather, self._strengths.heat_share)
-        self._frame = Frame(self._mechanism, self._strengths)
-        self._joints = Joints(self._mechanism, self._strengths, joint_rng)
+        self._warm = WarmUp(self.mechanism.links, self._weather, self._strengths.heat_share)
+        self._frame = Frame(self.mechanism, self._strengths)
+        self._joints = Joints(self.mechanism, self._strengths, joint_rng)
         self._sensors = Sensors(geometry, wiring, self._strengths, sensor_rng)
-        self._stroke_mm = self._mechanism.stroke_mm
+        self._stroke_mm = self.mechanism.stroke_mm
         self._motion: TourMotion | SetpointMotion | PlanMotion | FollowMotion = SetpointMotion(
-            standing(np.zeros(self._mechanism.scales)), drives
+            standing(np.zeros(self.mechanism.scales)), drives
         )
         self._rows = rows
         self._unsolved_s = 0.0, 0.0  # time (s) since the last `advance`, and the part of it with moving links
@@ -99,9 +99,9 @@ class World:
         self.force_M_N: FloatArray = np.zeros(3)
         self.mode: Mode = "zero"
         self._equilibrium = Equilibrium(
-            self._mechanism, self._strengths, self._frame, self._joints, self._causes, self._warm, self._weather
+            self.mechanism, self._strengths, self._frame, self._joints, self._causes, self._warm, self._weather
         )
-        self._state = self._solve(self._motion.position_mm, self._mechanism.posture0)
+        self._state = self._solve(self._motion.position_mm, self.mechanism.posture0)
         self._readings: Mapping[str, float] = self._read_gauges()
 
     # --- motion and time ----------------------------------------------------------------------------
@@ -176,7 +176,7 @@ class World:
     @cached_property
     def _points_mm(self) -> FloatArray:
         """(POINTS, n) scale values at the tour's points; a campaign, which has points of its own, never asks."""
-        return draw_points_mm(self._mechanism, self._tour_rng)
+        return draw_points_mm(self.mechanism, self._tour_rng)
 
     @property
     def unnatural_K_per_s(self) -> float:
@@ -240,7 +240,7 @@ class World:
     @property
     def tip_frame(self) -> str:
         """Frame of the tip's coordinates: "M", or "P" (place on the workpiece) with the tool on the plate."""
-        return self._mechanism.tip_frame
+        return self.mechanism.tip_frame
 
     @property
     def scale_mm(self) -> FloatArray:
@@ -270,15 +270,11 @@ class World:
 
     def link_change_mm(self) -> FloatArray:
         """(n,) change of the true distance between each link's joint centres since machine zero."""
-        return self._state.link_mm - self._mechanism.lengths0_mm
+        return self._state.link_mm - self.mechanism.lengths0_mm
 
     def axial_N(self) -> FloatArray:
         """(n,) link forces beyond those at machine zero, tension positive."""
         return self._state.axial_N
-
-    @property
-    def mechanism(self) -> Mechanism:
-        return self._mechanism
 
     @property
     def posture(self) -> Posture:
@@ -383,12 +379,12 @@ class World:
 
     def _checked(self, scale_mm: Sequence[float]) -> FloatArray:
         values = np.array(scale_mm, dtype=float)
-        if values.shape != (self._mechanism.scales,):
+        if values.shape != (self.mechanism.scales,):
             raise CompdError.of(
                 "scale_mm",
                 "one value per scale is needed",
                 value=str(list(scale_mm)),
-                allowed=f"{self._mechanism.scales} numbers, mm",
+                allowed=f"{self.mechanism.scales} numbers, mm",
             )
         if not np.all(np.abs(values) <= self._stroke_mm):
             stroke = f"{self._stroke_mm.min():.1f}"
