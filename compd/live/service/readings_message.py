@@ -74,7 +74,7 @@ class ReadingsMessage:
             problem = inputs.zero.problems[0]
             message["no_zero"] = {"where": problem.where, "what": problem.what, "next_step": problem.next_step}
         if inputs.target is not None:
-            message["target"] = omit_unknown(vars(inputs.target))
+            message["target"] = _known(vars(inputs.target))
         if inputs.ending:
             message["ending"] = inputs.ending
         message |= cycle.models.hashes
@@ -122,12 +122,21 @@ def parse_readings(message: Mapping[str, Any], channels: Sequence[str]) -> Recor
     return RecordedCycle(with_zero_of(from_plain(message["carried"]), zero), inputs, sent)
 
 
+def _known(fields: Mapping[str, Any]) -> dict[str, Any]:
+    """The fields that are known; `omit_unknown` takes ten times as long, since it looks into every part."""
+    return {
+        name: part
+        for name, part in fields.items()
+        if part is not None and not (isinstance(part, float) and not math.isfinite(part))
+    }
+
+
 def _reading(reading: Reading) -> dict[str, Any]:
     """A reading as plain data: its value, or why there is none."""
     value, time_s, quality, detail, motion = reading
     if quality is Quality.OK:
         good = {"value": value, "time_s": time_s}
-        return good if motion is None else good | {"motion": omit_unknown(motion._asdict())}
+        return good if motion is None else good | {"motion": _known(motion._asdict())}
     fault = {"quality": quality, "time_s": time_s}
     return fault | {"detail": detail} if detail else fault
 
