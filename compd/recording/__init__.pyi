@@ -13,7 +13,6 @@ from .open_part import OpenPartFormat as OpenPartFormat
 from .open_part import close_part as close_part
 from .reader import read_recording as read_recording
 from .reader import read_sample as read_sample
-from .recording import BLOCKS as BLOCKS
 from .recording import Recording as Recording
 from .recording import UsableRows as UsableRows
 from .reference import Frame as Frame
