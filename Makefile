@@ -171,7 +171,7 @@ deb: $(STAMP) docs
 	for release in $(RELEASES); do debian/build $$release build/deb/compd-*.tar.gz || exit 1; done
 
 SAMPLE := kinematics cycle diagnose
-BENCH := $(SAMPLE) compare loop latency flood throughput page gateway stream fleet kilohertz targets
+BENCH := $(SAMPLE) compare loop latency flood throughput page gateway long fleet kilohertz targets
 
 bench: $(STAMP)
 	@for name in $(BENCH); do $(BIN)/python -m tests.benchmarks.bench_$$name || exit 1; done

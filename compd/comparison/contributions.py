@@ -33,7 +33,7 @@ def contributions(
     """
     predicted_mm = aligned.predicted_mm(sum_deltas(list(by_effect.values())))
     result: dict[str, Contribution] = {}
-    for name, added in deltas_without(aligned, by_effect).items():
+    for name, added in _deltas_without(aligned, by_effect).items():
         without_mm = aligned.predicted_mm(added)
         rows = used & np.isfinite(without_mm).all(axis=1)
         residual_um = (aligned.measured_mm - without_mm) * UM_PER_MM
@@ -44,7 +44,7 @@ def contributions(
     return result
 
 
-def deltas_without(aligned: AlignedRecording, by_effect: Mapping[str, Deltas]) -> dict[str, Deltas]:
+def _deltas_without(aligned: AlignedRecording, by_effect: Mapping[str, Deltas]) -> dict[str, Deltas]:
     """What is added at the ports with each source switched off, by the names of `contributions`."""
     total = sum_deltas(list(by_effect.values()))
     without: dict[str, Deltas] = {}

@@ -15,7 +15,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
-from typing import NamedTuple
 
 import numpy as np
 
@@ -25,46 +24,18 @@ from compd.model.effects import ConstantValues, Effect, Observations, evaluate_b
 from compd.units import UM_PER_MM
 
 
-class InitialState(NamedTuple):
-    """One unknown state at the start of one session, and one fitted number by which it acts.
-
-    session : its place among the recording's sessions.  place, state : array of the memory, and place in it.
-    number : of the effect's fitted numbers.
-    """
-
-    session: int
-    place: int
-    state: int
-    number: int
-
-    @property
-    def key(self) -> tuple[int, int, int]:
-        """Which it is within its session."""
-        return self[1:]
-
-
 def initial_state_columns(aligned: AlignedRecording, effect: Effect, constants: ConstantValues) -> FloatArray:
     """(N, m, Q) by how many um each unknown state at the start of each session moves the prediction, per unit of it.
 
     The Q states are those of the first session, then of the next; a state moves only the rows of its own session. None,
     Q = 0, for an effect without unknown states.
     """
-    columns = [column for _, column in _states(aligned.rows, effect, constants)]
+    rows = aligned.rows
+    sessions = _sessions(rows) if effect.unknown_states else ()
+    columns = [column for session in sessions for column in _session_columns(effect, constants, rows, session)]
     if not columns:
         return np.zeros((*aligned.measured_mm.shape, 0))
     return aligned.propagated(effect, np.stack(columns, axis=2)) * UM_PER_MM
-
-
-def initial_states(rows: Observations, effect: Effect, constants: ConstantValues) -> list[InitialState]:
-    """What the columns of `initial_state_columns` stand for, in their order."""
-    return [state for state, _ in _states(rows, effect, constants)]
-
-
-def _states(rows: Observations, effect: Effect, constants: ConstantValues) -> Iterator[tuple[InitialState, FloatArray]]:
-    """Each unknown state with what it adds at the ports (N, sum of sizes)."""
-    for number, session in enumerate(_sessions(rows) if effect.unknown_states else ()):
-        for key, column in _session_columns(effect, constants, rows, session):
-            yield InitialState(number, *key), column
 
 
 def _sessions(rows: Observations) -> Iterator[IntArray]:
@@ -74,9 +45,8 @@ def _sessions(rows: Observations) -> Iterator[IntArray]:
 
 def _session_columns(
     effect: Effect, constants: ConstantValues, rows: Observations, session: IntArray
-) -> Iterator[tuple[tuple[int, int, int], FloatArray]]:
-    """(N, sum of port sizes) each: what a state at the start of one session adds for 1 of each fitted number, mm; with
-    place, state and number as in `InitialState`.
+) -> Iterator[FloatArray]:
+    """(N, sum of port sizes) each: what a state at the start of one session adds for 1 of each fitted number, mm.
 
     The session begins with the first row in which the effect is known. States that move nothing are left out.
     """
@@ -97,4 +67,4 @@ def _session_columns(
             for number in np.flatnonzero((np.nan_to_num(moved) != 0).any(axis=(0, 1))):
                 column = np.zeros((len(rows), moved.shape[1]))
                 column[session] = moved[:, :, number]
-                yield (place, state, int(number)), column
+                yield column

@@ -63,20 +63,13 @@ def nuisance_beside(
     return np.asarray((columns_um / norms) @ combinations[sizes > MIN_SHARE].T)
 
 
-def nuisance_parameters(
-    aligned: AlignedRecording, effects: Sequence[FittedEffect], residual_um: FloatArray, use: BoolArray
-) -> FloatArray:
-    """(Q,) the nuisance terms of a residual (N, m), fitted to the rows `use` (N,) by robust regression.
-
-    Zeros where no row is left.
-    """
-    return _fitted_parameters(aligned, nuisance_columns(aligned, effects), residual_um, use)
-
-
 def fit_along(
     aligned: AlignedRecording, effects: Sequence[FittedEffect], residual_um: FloatArray, use: BoolArray
 ) -> FittedAlong:
-    """What the nuisance terms explain of a residual (N, m), fitted as in `nuisance_parameters`; zeros without any."""
+    """What the nuisance terms explain of a residual (N, m), fitted to the rows `use` (N,) by robust regression.
+
+    Zeros without any term, and where no row is left.
+    """
     G = nuisance_columns(aligned, effects)
     if not G.shape[2]:
         none = np.zeros_like(residual_um)

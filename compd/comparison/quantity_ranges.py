@@ -23,10 +23,3 @@ def quantity_ranges(fitted: Sequence[FittedEffect], rows: Observations, used: Bo
             if np.isfinite(values).any():
                 ranges[name] = float(np.nanmin(values)), float(np.nanmax(values))
     return ranges
-
-
-def joined_ranges(one: Ranges, other: Ranges) -> Ranges:
-    """Of the rows of both."""
-    nothing = (np.inf, -np.inf)
-    each = {name: (one.get(name, nothing), other.get(name, nothing)) for name in (*one, *other)}
-    return {name: (min(a[0], b[0]), max(a[1], b[1])) for name, (a, b) in each.items()}

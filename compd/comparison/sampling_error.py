@@ -60,7 +60,7 @@ def _span(sample: RecordingSample) -> str:
 
 
 def _gap(sample: RecordingSample) -> str:
-    rows = f"{sample.gap_rows + 1:,} rows"
+    rows = f"{sample.gap_rows:,} rows"
     return rows if np.isnan(sample.gap_s) else f"about {number_text(sample.gap_s, digits=2)} s ({rows})"
 
 

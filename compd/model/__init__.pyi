@@ -1,6 +1,5 @@
 from .deltas import Deltas as Deltas
 from .deltas import Memories as Memories
-from .deltas import basis_deltas as basis_deltas
 from .deltas import deltas_by_effect as deltas_by_effect
 from .deltas import effect_deltas as effect_deltas
 from .deltas import split_by_port as split_by_port

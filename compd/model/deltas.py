@@ -28,16 +28,11 @@ def split_by_port(effect: Effect, rows: Observations, values: NDArray[np.float64
 def effect_deltas(fitted: FittedEffect, rows: Observations, memory: Memory = None) -> tuple[Deltas, Memory]:
     """What one effect adds at its ports, basis @ theta: (N, size) each; and its memory after the rows."""
     basis, memory = evaluate_basis(fitted.effect, rows, fitted.constants, memory)
-    return basis_deltas(fitted, rows, basis), memory
-
-
-def basis_deltas(fitted: FittedEffect, rows: Observations, basis: FloatArray) -> Deltas:
-    """What one effect adds at its ports, from its basis (N, sum of sizes, P) in these rows."""
     # summed column by column: a matrix product may round differently for one row than for many
     total = np.zeros(basis.shape[:2])
     for column, value in enumerate(fitted.theta):
         total += basis[:, :, column] * value
-    return split_by_port(fitted.effect, rows, total)
+    return split_by_port(fitted.effect, rows, total), memory
 
 
 def deltas_by_effect(

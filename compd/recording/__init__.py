@@ -16,7 +16,7 @@ An empty cell is a missing value. A column's name ends in its unit. The format i
     - {row: 17, reason: the tracker's beam was cut}
 
 Module `columns` has the names, units and decimals, `sidecar` the YAML; `writer` writes both files, `reader` reads and
-checks them, and `blocks` does so block by block; `convert` makes one table into the other.
+checks them, or a `sample` of a long one; `convert` makes one table into the other.
 """
 
 import lazy_loader

@@ -15,7 +15,7 @@ from pathlib import Path
 
 from compd.fleet import examination
 from compd.live import daemon as daemon_module
-from tests.benchmarks import bench_fleet, bench_kilohertz, bench_stream
+from tests.benchmarks import bench_fleet, bench_kilohertz, bench_long
 from tests.benchmarks.bench_cycle import EFFECTS, whole_cycles
 from tests.benchmarks.bench_latency import AllAtOnce
 from tests.benchmarks.cost_table import Cost, save
@@ -66,21 +66,15 @@ def kilohertz_costs(seconds: int, rounds: int) -> list[Cost]:
 
 def long_recording_costs(rows: int) -> list[Cost]:
     with tempfile.TemporaryDirectory() as temporary:
-        measured = bench_stream.measure(rows, Path(temporary))
-    whole, by_pandas = measured.with_effects, measured.by_pandas
+        parquet = bench_long.measure(rows, Path(temporary))[0]
     return [
         Cost(
-            f"`compd compare` of {rows:,} rows with {len(bench_stream.EFFECTS)} effects, processor time",
-            f"{whole.row_us:.1f} us a row",
-            f"pandas reads the file: {by_pandas.row_us:.2f} us",
-            f"{whole.row_us / by_pandas.row_us:.1f}",
+            f"a comparison of {rows:,} rows with {len(bench_long.EFFECTS)} effects, by a sample, processor time",
+            f"{parquet.compared.processor_s:.1f} s",
+            f"pyarrow reads the file: {parquet.by_arrow.processor_s:.1f} s",
+            f"{parquet.processor_ratio:.1f}",
         ),
-        Cost(
-            "memory for that",
-            f"{whole.cost.largest_MB:.0f} MB",
-            f"pandas, {by_pandas.rows:,} rows: {by_pandas.cost.largest_MB:.0f} MB",
-            f"{whole.cost.largest_MB / by_pandas.cost.largest_MB:.2f}",
-        ),
+        Cost("memory for that", f"{parquet.largest_MB:.0f} MB", "-", "-"),
     ]
 
 
@@ -103,7 +97,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--quick", action="store_true", help="measure little of everything, write nothing")
     parser.add_argument("--rounds", type=int, default=5, help="runs of a minute at 1 kHz")
-    parser.add_argument("--rows", type=int, default=20_000_000, help="of the long recording")
+    parser.add_argument("--rows", type=int, default=2_000_000, help="of the long recording")
     parser.add_argument("--recordings", type=int, default=500, help="of the fleet")
     options = parser.parse_args()
     quiet()
