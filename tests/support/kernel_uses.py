@@ -16,7 +16,6 @@ from compd.model import MachineModel
 from compd.model.effects import evaluate_basis
 from compd.model.kinematics import (
     forward_kinematics,
-    inverse_kinematics,
     links_at,
     pose_derivatives,
     track_motion,
@@ -26,6 +25,7 @@ from tests.support.effect_rows import HEXAPOD, LIBRARY, TRIPOD, constants_of, ob
 from tests.support.formulas import written
 from tests.support.live_machine import RAW_AT_ZERO_MM, machine
 from tests.support.live_models import with_noise
+from tests.support.model_machines import inverse_pose
 from tests.support.paths import CONFIG, ROOT
 
 FILES = ROOT / "tests" / "guard" / "files-0.2"
@@ -54,7 +54,7 @@ def _pose(model: MachineModel, random: np.random.Generator) -> None:
     zero = model.zero
     mechanism = model.mechanism(zero.base_joints_M_mm)
     tip_M_mm = zero.contact.tip_M_mm + random.uniform(-60, 60, (50, 3))
-    pose = inverse_kinematics(mechanism, tip_M_mm, zero.contact.tip_P_mm, zero.rotation_M_P)
+    pose = inverse_pose(model, mechanism, tip_M_mm, zero.contact.tip_P_mm, zero.rotation_M_P)
     forward_kinematics(mechanism, pose.link_length_mm, pose.origin_M_mm, pose.rotation_M_P)
     moved_mm = random.normal(size=(50, model.links))
     links_at(model.actuators, zero.base_joints_M_mm, moved_mm)

@@ -7,7 +7,8 @@ With q the place of an actuator in mm and u, v unit vectors in {M}, the base joi
     TURNS      a = a0 + radius (cos(q/radius) u + sin(q/radius) v),   l = l0
 
 (q of a turning actuator is the arc, radius times the angle). The inverse solves the closure for the m actuators and the
-6 - m coordinates of the platform that the target leaves free, by Newton's method: six equations for six unknowns.
+6 - m coordinates of the platform that the target leaves free, by Newton's method: six equations for six unknowns. Where
+each link has an actuator of its own that extends it, the actuators follow from each pose: a hexapod takes no step.
 """
 
 from __future__ import annotations
@@ -170,24 +171,16 @@ def _check_solution(
 
 
 @helper
-def _set_lone_extended(
-    kinds: IntArray,
-    actuator_of_link: IntArray,
-    rod_length_mm: FloatArray,
-    value_mm: FloatArray,
-    actuator_mm: FloatArray,
-    lengths_mm: FloatArray,
+def extend(
+    actuator_of_link: IntArray, rod_length_mm: FloatArray, lengths_mm: FloatArray, actuator_mm: FloatArray
 ) -> None:
-    """Where each actuator has one link, an extended one is as long as its joints are apart, to the last bit."""
+    """Set actuators that each extend one link of their own to the links' lengths."""
     for i in range(actuator_of_link.shape[0]):
-        a = actuator_of_link[i]
-        if kinds[a] == EXTENDS and actuator_of_link.shape[0] == kinds.shape[0]:
-            lengths_mm[i] += value_mm[i]
-            actuator_mm[a] = lengths_mm[i] - rod_length_mm[i]
+        actuator_mm[actuator_of_link[i]] = lengths_mm[i] - rod_length_mm[i]
 
 
 @helper
-def solve_actuated_inverse(
+def solve_inverse(
     base_joints_M: FloatArray,
     platform_joints_P: FloatArray,
     revolute_axes: FloatArray,
@@ -212,7 +205,7 @@ def solve_actuated_inverse(
     residual_mm: FloatArray,
     reason: IntArray,
 ) -> None:
-    """See `compd.model.kinematics.actuators.inverse_by_actuators`."""
+    """See `compd.model.kinematics.actuators.inverse_kinematics`."""
     n, m = actuator_of_link.shape[0], kinds.shape[0]
     actuator_mm[:] = guess_mm
     R[:, :] = attitude_R
@@ -223,9 +216,10 @@ def solve_actuated_inverse(
     J, M, by_actuator = np.empty((6, 6)), np.empty((6, 6)), np.empty((6, m))
     pivot = np.empty(6, np.int64)
     finite = pose_is_finite(base_joints_M, platform_joints_P, revolute_axes, tip_M, R)
-    finite &= all_finite(tip_P) and all_finite(guess_mm)
+    finite &= all_finite(tip_P) and all_finite(guess_mm) and all_finite(rod_length_mm)
     reason[0] = (OK if size_mm > 0.0 else NEAR_SINGULAR) if finite else NOT_FINITE
-    step, sign, first_sign = math.inf, 0.0, 0.0
+    extends_each = n == m and not kinds.any()
+    step, sign, first_sign = 0.0 if extends_each and n == 6 else math.inf, 0.0, 0.0
     while reason[0] == OK:
         _origin_at(place, R, tip_P, origin_M)
         place_links(
@@ -235,6 +229,9 @@ def solve_actuated_inverse(
         if not evaluate_closure(origin_M, R, joints_M, platform_joints_P, revolute_axes, hinges, size_mm, value, J):
             reason[0] = UNREACHABLE
             break
+        if extends_each:
+            lengths_mm[:] = value[:n]
+            extend(actuator_of_link, rod_length_mm, lengths_mm, actuator_mm)
         value[:n] -= lengths_mm
         if step <= STEP_TOLERANCE_MM:
             break
@@ -257,23 +254,19 @@ def solve_actuated_inverse(
     if reason[0] == OK:
         orthonormalise(R)
         residual_mm[0] = max_abs(value)
-        _set_lone_extended(kinds, actuator_of_link, rod_length_mm, value, actuator_mm, lengths_mm)
         reason[0] = _check_solution(J, pivot, residual_mm[0], sign == first_sign, R, attitude_R)
     if reason[0] != OK:
-        origin_M[:] = math.nan
-        R[:, :] = math.nan
-        actuator_mm[:] = math.nan
-        lengths_mm[:] = math.nan
-        joints_M[:, :] = math.nan
+        origin_M[:] = actuator_mm[:] = lengths_mm[:] = math.nan
+        R[:, :] = joints_M[:, :] = math.nan
 
 
-actuated_inverse = kernel(
+inverse = kernel(
     [
         *[MATRIX, MATRIX, MATRIX, INTEGER_ROWS, INTEGERS, MATRIX, MATRIX, VECTOR, INTEGERS, VECTOR, INTEGERS],
         *[VECTOR, VECTOR, MATRIX, VECTOR, VECTOR, MATRIX, VECTOR, VECTOR, MATRIX, INTEGERS, VECTOR, INTEGERS],
     ],
     "(n,d),(n,d),(k,d),(k,c),(m),(m,d),(m,d),(m),(n),(n),(s),(d),(d),(d,d),(m)->(d),(d,d),(m),(n),(n,d),(),(),()",
-)(solve_actuated_inverse)
+)(solve_inverse)
 
 
 placed_links = kernel(

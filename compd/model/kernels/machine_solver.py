@@ -11,7 +11,6 @@ from typing import Any
 from compd.arrays import FloatArray
 from compd.jit import helper
 from compd.model.kernels.forward_solver import solve_forward
-from compd.model.kernels.inverse_solver import solve_inverse
 from compd.model.kernels.octahedron_frame import solve_octahedron
 from compd.rotation import to_inner_frame, to_outer_frame
 
@@ -80,35 +79,6 @@ def forward_pose(
         length_mm[:n],
         guess_origin_M_mm[:],
         guess_rotation_M_P[:],
-        pose.origin_M_mm,
-        pose.rotation_M_P,
-        pose.link_length_mm[:n],
-        pose.iterations,
-        pose.residual_mm,
-        pose.reason,
-    )
-
-
-@helper
-def inverse_pose(
-    model: Any,
-    base_joints_M_mm: FloatArray,
-    machine: Any,
-    tip_M_mm: FloatArray,
-    tip_P_mm: FloatArray,
-    attitude_M_P: FloatArray,
-    pose: Any,
-) -> None:
-    n, k = model.links, model.axes
-    pose.base_joints_M_mm[:, :] = base_joints_M_mm
-    solve_inverse(
-        pose.base_joints_M_mm[:n],
-        machine.platform_joints_P_mm[:n],
-        machine.revolute_axes_P[:k],
-        model.hinges[:k],
-        tip_M_mm[:],
-        tip_P_mm[:],
-        attitude_M_P[:],
         pose.origin_M_mm,
         pose.rotation_M_P,
         pose.link_length_mm[:n],

@@ -1,4 +1,4 @@
-"""Machines whose actuators are unknowns of the inverse: on a frame that has moved, and with what effects add.
+"""Forward and inverse of a machine on a frame that has moved, and with what effects add.
 
 What a base carries turns with it: the rails and circles of its actuators, and the axes of its hinges.
 """
@@ -11,7 +11,7 @@ import numpy as np
 
 from compd.arrays import FloatArray
 from compd.jit import helper
-from compd.model.kernels.actuated_links import place_links, solve_actuated_inverse
+from compd.model.kernels.actuated_links import EXTENDS, extend, place_links, solve_inverse
 from compd.model.kernels.machine_solver import forward_pose
 from compd.rotation import to_inner_frame, to_outer_frame
 
@@ -26,8 +26,9 @@ def stand_on(model: Any, rotation_M_B: FloatArray, base_joints_M_mm: FloatArray,
     machine.reading_to_length_mm[:] = 0.0
     machine.joint_shortening_mm[:] = 0.0
     for a in range(model.scales):
-        turn_with_base(model, rotation_M_B, model.cosine_M[a], machine.cosine_M[a])
-        turn_with_base(model, rotation_M_B, model.sine_M[a], machine.sine_M[a])
+        if model.kinds[a] != EXTENDS:
+            turn_with_base(model, rotation_M_B, model.cosine_M[a], machine.cosine_M[a])
+            turn_with_base(model, rotation_M_B, model.sine_M[a], machine.sine_M[a])
     for h in range(model.axes):
         if model.hinges[h, 1] == 1:
             turn_with_base(model, rotation_M_B, model.revolute_axes_P[h], machine.revolute_axes_P[h])
@@ -89,14 +90,21 @@ def inverse_standing(
     tip_P_mm: FloatArray,
     attitude_M_P: FloatArray,
     guess_mm: FloatArray,
+    same_pose: bool,
     pose: Any,
 ) -> None:
-    """The pose and the actuators that bring the tip to its target; guess_mm (m,), where they are about."""
+    """The pose and the actuators that bring the tip to its target; guess_mm (m,), where they are about.
+
+    same_pose : `pose` reaches this target on a machine that differs in nothing but its links' lengths.
+    """
     n, m, k = model.links, model.scales, model.axes
     rod_length_mm = np.empty(n)
     for i in range(n):
         rod_length_mm[i] = model.rod_length_mm[i] + machine.reading_to_length_mm[i] - machine.joint_shortening_mm[i]
-    solve_actuated_inverse(
+    if same_pose and model.extends_each:
+        extend(model.of_link[:n], rod_length_mm, pose.link_length_mm, pose.actuator_mm)
+        return
+    solve_inverse(
         machine.base_joints_M_mm[:n],
         machine.platform_joints_P_mm[:n],
         machine.revolute_axes_P[:k],

@@ -168,13 +168,10 @@ def _add_hinges(
 @helper
 def _stand_moved(model: Any, frame: Any, pose: Any, machine: Any, length_mm: FloatArray) -> None:
     """The machine on a frame that has moved, its base joints where the actuators of the pose have them."""
-    if model.by_actuators:
-        stand_on(model, frame.rotation_M_B, frame.base_joints_M_mm, machine)
-        joints_M_mm = np.zeros_like(machine.base_joints_M_mm)
-        place_standing(model, machine, pose.actuator_mm, joints_M_mm, length_mm)
-        machine.base_joints_M_mm[:, :] = joints_M_mm
-    else:
-        machine.base_joints_M_mm[:, :] = frame.base_joints_M_mm
+    stand_on(model, frame.rotation_M_B, frame.base_joints_M_mm, machine)
+    joints_M_mm = np.zeros_like(machine.base_joints_M_mm)
+    place_standing(model, machine, pose.actuator_mm, joints_M_mm, length_mm)
+    machine.base_joints_M_mm[:, :] = joints_M_mm
 
 
 @helper

@@ -27,7 +27,7 @@ from compd.model import (
 )
 from compd.model.effect_memory import EffectMemory
 from compd.model.effects import FittedEffect, MachineDetails, Observations, port_size, unmet_needs
-from compd.model.kinematics import Movement, Pose, inverse_by_actuators
+from compd.model.kinematics import Movement, Pose, inverse_kinematics
 from compd.model.library import load_library
 from compd.operation_settings import Wiring
 from compd.rotation import rotation_matrix, rotation_vector, to_inner
@@ -279,7 +279,7 @@ def test_without_scales_the_commanded_pose_makes_the_controller_drive_what_is_wa
     assert found.pose_correction is not None
     assert np.abs(found.pose_correction[:3]).max() > 1e-4
     assert len(found.correction_mm) == len(found.scale_setpoint_mm) == 0
-    drive = inverse_by_actuators(
+    drive = inverse_kinematics(
         model.mechanism(model.base_joints_at_0_M_mm),
         model.actuators,
         target_M + zero_B @ found.pose_correction[:3],

@@ -14,7 +14,7 @@ import pytest
 from compd.configuration import Geometry
 from compd.machine_builder import build_model
 from compd.model import MachineModel
-from compd.model.kinematics import forward_kinematics, inverse_by_actuators, links_at, pose_derivatives
+from compd.model.kinematics import forward_kinematics, inverse_kinematics, links_at, pose_derivatives
 from compd.operation_settings import Wiring
 from compd.rotation import rotation_matrix
 from tests.support.model_machines import Floats, worked_cases
@@ -105,7 +105,7 @@ def test_forward_inverse_and_derivatives(kind: str) -> None:
         np.testing.assert_allclose(pose.origin_M_mm, case["origin_mm"], atol=TOLERANCE_MM)
         np.testing.assert_allclose(pose.rotation_M_P, R, atol=TOLERANCE_MM / 100)
         fixes_attitude = bool(model.actuators.fixed[3:].any())
-        reached = inverse_by_actuators(
+        reached = inverse_kinematics(
             model.mechanism(base_M),
             model.actuators,
             case["tip_mm"],
