@@ -12,12 +12,11 @@ from compd.configuration import load
 from compd.gauge import ReadingMotion, good
 from compd.live.memory import Readings
 from compd.live.record import RecordedCycles, replay_cycles
-from compd.model import MachineModel
+from compd.model import MachineModel, sensitivities
 from compd.model.effects import evaluate_basis
 from compd.model.kinematics import (
     forward_kinematics,
     links_at,
-    pose_derivatives,
     track_motion,
 )
 from compd.rotation import compose, rotation_matrix, rotation_vector
@@ -39,6 +38,7 @@ def use_all_kernels() -> None:
     for model in (TRIPOD, HEXAPOD):
         _pose(model, random)
         rows = observe_rows(model, random_inputs(model))
+        sensitivities(model, rows, ["scale"])
         for effect in LIBRARY.values():
             evaluate_basis(effect, rows, constants_of(effect), None)
     # whether w is a period is seen from the formula's values
@@ -58,7 +58,6 @@ def _pose(model: MachineModel, random: np.random.Generator) -> None:
     forward_kinematics(mechanism, pose.link_length_mm, pose.origin_M_mm, pose.rotation_M_P)
     moved_mm = random.normal(size=(50, model.links))
     links_at(model.actuators, zero.base_joints_M_mm, moved_mm)
-    pose_derivatives(mechanism, model.actuators, moved_mm, pose.origin_M_mm, pose.rotation_M_P)
     track_motion(None, np.arange(50.0), moved_mm, random.normal(size=(50, 2)))
 
 

@@ -121,8 +121,9 @@ def set_tip_derivatives(
     set_contact(model, pose, model.tool_mm, result.tip_M_mm, result.tip_P_mm)
     row, tip_M_mm = work.row, result.tip_M_mm
     set_row(model, pose, tip_M_mm, scale_mm, joint_mm, frame_mm, time_s, False, motion, row)
-    by_closure, by_scale, targets = np.empty((3, 6)), np.empty((6, model.scales)), program.targets
-    if not set_tip_by_closure(model, standing, pose, tip_M_mm, by_closure, by_scale):
+    by_closure, by_scale = np.empty((3, 6)), np.empty((6, model.scales))
+    targets = np.append(program.targets, model.scales + model.joints)  # of the frame's distances one for all
+    if not set_tip_by_closure(model, standing, pose, row, tip_M_mm, by_closure, by_scale):
         return
     set_tip_by_ports(
         model,
@@ -132,7 +133,6 @@ def set_tip_derivatives(
         row,
         by_closure,
         by_scale,
-        joint_mm,
         frame_mm,
         targets,
         result.frame,

@@ -2,7 +2,6 @@ from .actuators import ACTUATOR_KINDS as ACTUATOR_KINDS
 from .actuators import Actuators as Actuators
 from .actuators import inverse_kinematics as inverse_kinematics
 from .actuators import links_at as links_at
-from .actuators import pose_derivatives as pose_derivatives
 from .frame import Frame as Frame
 from .frame import FrameGeometry as FrameGeometry
 from .frame import base_pose as base_pose

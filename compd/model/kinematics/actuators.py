@@ -8,11 +8,10 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import numpy as np
 from numpy.typing import ArrayLike
 
 from compd.arrays import FloatArray, IntArray
-from compd.model.kernels import inverse, placed_links, pose_by_actuators
+from compd.model.kernels import inverse, placed_links
 from compd.model.kinematics.link_kinematics import Mechanism, Pose, check_mechanism
 
 # In the order of their numbers in `compd.model.kernels.actuated_links`.
@@ -84,22 +83,3 @@ def inverse_kinematics(
         *check_mechanism(mechanism), *actuators, tip_M_mm, tip_P_mm, rotation_M_P, guess_mm
     )
     return ActuatedPose(Pose(origin, rotation, lengths, iterations, residual, reason), actuator_mm, joints)
-
-
-def pose_derivatives(
-    mechanism: Mechanism,
-    actuators: Actuators,
-    actuator_mm: ArrayLike,
-    origin_M_mm: ArrayLike,
-    rotation_M_P: ArrayLike,
-) -> FloatArray:
-    """Derivatives (..., 6, m) of the pose by the actuators; nan where the pose is singular.
-
-    The rows are the displacement of the origin of {P}, mm per mm, and the rotation about {M}'s axes, rad per mm.
-
-    mechanism : base joints where the actuators have moved them, as from `links_at`.
-    """
-    by_actuator, _ = pose_by_actuators(
-        *check_mechanism(mechanism), *actuators[:5], actuator_mm, origin_M_mm, rotation_M_P, np.zeros(6)
-    )
-    return np.asarray(by_actuator)
