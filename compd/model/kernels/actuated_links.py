@@ -115,21 +115,25 @@ def _origin_at(tip_M: FloatArray, R: FloatArray, tip_P: FloatArray, origin_M: Fl
 
 @helper
 def _free_step(
-    J: FloatArray, by_actuator: FloatArray, fixed: IntArray, M: FloatArray, pivot: IntArray, x: FloatArray
+    J: FloatArray, by_actuator: FloatArray, fixed: IntArray, first: int, M: FloatArray, pivot: IntArray, x: FloatArray
 ) -> float:
-    """Solve for the free coordinates and the actuators, x (6,) in place; returns the determinant's sign."""
-    column = 0
+    """Solve the rows from `first` on for the free coordinates and, where that is 0, the actuators.
+
+    x (6,) : in place, the step by the coordinates, and then by the actuators.  Returns the determinant's sign.
+    """
+    size, column = 6 - first, 0
     for c in range(6):
         if fixed[c] == 0:
-            for i in range(6):
-                M[i, column] = J[i, c]
+            for i in range(size):
+                M[i, column] = J[first + i, c]
             column += 1
-    for i in range(6):
-        for a in range(by_actuator.shape[1]):
+    for i in range(size):
+        x[i] = x[first + i]
+        for a in range(size - column):
             M[i, column + a] = by_actuator[i, a]
-    sign = lu_factor(M, pivot)
+    sign = lu_factor(M[:size, :size], pivot)
     if sign != 0.0:
-        lu_solve(M, pivot, x)
+        lu_solve(M[:size, :size], pivot, x[:size])
     return sign
 
 
@@ -137,35 +141,42 @@ def _free_step(
 def _move_freely(
     fixed: IntArray,
     x: FloatArray,
-    share: float,
     size_mm: float,
     place: FloatArray,
     R: FloatArray,
     actuator_mm: FloatArray,
-) -> None:
-    """Take a share of the step x of `_free_step`, in the free coordinates and the actuators."""
-    turn = np.zeros(3)
+    moved: FloatArray,
+) -> float:
+    """Take the step x of `_free_step`, a long one shortened; returns its length.  moved (6,) : room."""
+    step = max_abs(x)
+    share = STEP_LIMIT * size_mm / max(step, STEP_LIMIT * size_mm)
     column = 0
     for c in range(6):
+        moved[c] = 0.0
         if fixed[c] == 0:
-            if c < 3:
-                place[c] += share * x[column]
-            else:
-                turn[c - 3] = share * x[column] / size_mm
+            moved[c] = share * x[column]
             column += 1
-    rotate_in_place(R, turn[0], turn[1], turn[2])
-    for a in range(actuator_mm.shape[0]):
-        actuator_mm[a] += share * x[column + a]
+    place += moved[:3]
+    rotate_in_place(R, moved[3] / size_mm, moved[4] / size_mm, moved[5] / size_mm)
+    for i in range(column, x.shape[0]):
+        actuator_mm[i - column] += share * x[i]
+    return step
 
 
 @helper
 def _check_solution(
-    J: FloatArray, pivot: IntArray, residual_mm: float, same_sign: bool, R: FloatArray, attitude_R: FloatArray
+    J: FloatArray,
+    room: FloatArray,
+    pivot: IntArray,
+    residual_mm: float,
+    same_sign: bool,
+    R: FloatArray,
+    attitude_R: FloatArray,
 ) -> int:
-    """The reason of a pose that Newton's method ended at; J is overwritten."""
+    """The reason of a pose that Newton's method ended at; J and room (6, 6) are overwritten."""
     if residual_mm > RESIDUAL_TOLERANCE_MM:
         return NO_CONVERGENCE
-    if lu_factor(J, pivot) == 0.0 or inverse_norm(J, np.empty((6, 6))) > AMPLIFICATION_LIMIT:
+    if lu_factor(J, pivot) == 0.0 or inverse_norm(J, room) > AMPLIFICATION_LIMIT:
         return NEAR_SINGULAR
     return OK if same_sign and not is_turned_over(R, attitude_R) else OTHER_ASSEMBLY
 
@@ -212,9 +223,8 @@ def solve_inverse(
     iterations[0], residual_mm[0] = 0, math.nan
     size_mm = platform_radius(platform_joints_P)
     place = tip_M.copy()
-    value, x = np.empty(6), np.empty(6)
+    value, pivot = np.empty(6), np.empty(6, np.int64)
     J, M, by_actuator = np.empty((6, 6)), np.empty((6, 6)), np.empty((6, m))
-    pivot = np.empty(6, np.int64)
     finite = pose_is_finite(base_joints_M, platform_joints_P, revolute_axes, tip_M, R)
     finite &= all_finite(tip_P) and all_finite(guess_mm) and all_finite(rod_length_mm)
     reason[0] = (OK if size_mm > 0.0 else NEAR_SINGULAR) if finite else NOT_FINITE
@@ -238,23 +248,26 @@ def solve_inverse(
         if iterations[0] == ITERATION_LIMIT:
             reason[0] = NO_CONVERGENCE
             break
-        closure_by_actuators(kinds, cosine_M, sine_M, radius_mm, actuator_of_link, hinges, actuator_mm, J, by_actuator)
+        if not extends_each:
+            closure_by_actuators(
+                kinds, cosine_M, sine_M, radius_mm, actuator_of_link, hinges, actuator_mm, J, by_actuator
+            )
         _rows_by_tip(J, R, tip_P, size_mm)
-        x[:] = -value
-        sign = _free_step(J, by_actuator, fixed, M, pivot, x)
+        value[:] = -value
+        first = n if extends_each else 0
+        sign = _free_step(J, by_actuator, fixed, first, M, pivot, value)
         if sign == 0.0:
             reason[0] = NEAR_SINGULAR
             break
         if iterations[0] == 0:
             first_sign = sign
-        step = max_abs(x)
-        shortened = STEP_LIMIT * size_mm / max(step, STEP_LIMIT * size_mm)
-        _move_freely(fixed, x, shortened, size_mm, place, R, actuator_mm)
+        step = _move_freely(fixed, value[: 6 - first], size_mm, place, R, actuator_mm, M[0])
         iterations[0] += 1
     if reason[0] == OK:
-        orthonormalise(R)
+        if iterations[0] > 0:
+            orthonormalise(R)
         residual_mm[0] = max_abs(value)
-        reason[0] = _check_solution(J, pivot, residual_mm[0], sign == first_sign, R, attitude_R)
+        reason[0] = _check_solution(J, M, pivot, residual_mm[0], sign == first_sign, R, attitude_R)
     if reason[0] != OK:
         origin_M[:] = actuator_mm[:] = lengths_mm[:] = math.nan
         R[:, :] = joints_M[:, :] = math.nan

@@ -65,7 +65,7 @@ def _solve_bare(
     frame, pose = result.bare_frame, result.bare_pose
     solve_frame(model, model.plate_points_M_mm, distances_mm, warm.supports_M_mm[w], frame)
     nominal, command, at_zero, standing = work.nominal, work.command, work.at_zero, work.standing
-    guess_mm, attitude = np.empty(m), np.empty((3, 3))
+    attitude = np.empty((3, 3))
     stand_on(model, model.zero_rotation_M_B, model.zero_base_joints_M_mm, at_zero)
     stand_on(model, frame.rotation_M_B, frame.base_joints_M_mm, standing)
     shortening_mm, reason = np.empty(n), standing.joint_reason
@@ -78,19 +78,18 @@ def _solve_bare(
         standing.joint_shortening_mm[:n] = 0.0
         attitude[:, :] = nominal.rotation_M_P
     else:
-        guess_mm[:] = warm.actuator_mm[w]
+        nominal.actuator_mm[:m] = warm.actuator_mm[w]
         attitude[:, :] = wanted.attitude_M_P[r]
-        inverse_standing(model, at_zero, result.target_M_mm, result.target_P_mm, attitude, guess_mm, False, nominal)
+        inverse_standing(model, at_zero, result.target_M_mm, result.target_P_mm, attitude, False, nominal)
     # what the frame does, and then what the joints do: an actuator may have several links
-    guess_mm[:] = nominal.actuator_mm[:m]
-    inverse_standing(model, standing, result.target_M_mm, result.target_P_mm, attitude, guess_mm, False, command)
+    command.actuator_mm[:] = nominal.actuator_mm
+    inverse_standing(model, standing, result.target_M_mm, result.target_P_mm, attitude, False, command)
     for a in range(m):
         contributions_mm[1, a] = command.actuator_mm[a] - nominal.actuator_mm[a]
         contributions_mm[0, a] = 0.0
     if k > 0:
         standing.joint_shortening_mm[:n] = shortening_mm
-        guess_mm[:] = command.actuator_mm[:m]
-        inverse_standing(model, standing, result.target_M_mm, result.target_P_mm, attitude, guess_mm, True, command)
+        inverse_standing(model, standing, result.target_M_mm, result.target_P_mm, attitude, True, command)
         for a in range(m):
             contributions_mm[0, a] = command.actuator_mm[a] - nominal.actuator_mm[a] - contributions_mm[1, a]
     if machine_tool:

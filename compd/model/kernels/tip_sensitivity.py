@@ -200,9 +200,7 @@ def _add_hinges(
 def _stand_moved(model: Any, frame: Any, pose: Any, machine: Any, length_mm: FloatArray) -> None:
     """The machine on a frame that has moved, its base joints where the actuators of the pose have them."""
     stand_on(model, frame.rotation_M_B, frame.base_joints_M_mm, machine)
-    joints_M_mm = np.zeros_like(machine.base_joints_M_mm)
-    place_standing(model, machine, pose.actuator_mm, joints_M_mm, length_mm)
-    machine.base_joints_M_mm[:, :] = joints_M_mm
+    place_standing(model, machine, pose.actuator_mm, machine.base_joints_M_mm, length_mm)
 
 
 @helper
