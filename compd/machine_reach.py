@@ -14,7 +14,7 @@ import numpy as np
 from compd.arrays import BoolArray, FloatArray
 from compd.model import MachineModel, MachineParts
 from compd.model.kernels import AMPLIFICATION_LIMIT, Reason
-from compd.model.kinematics import Mechanism, closure_at, inverse_by_actuators, links_at
+from compd.model.kinematics import Mechanism, closure_at, inverse_kinematics, links_at
 from compd.rotation import compose, rotation_matrix
 
 COORDINATES = ("x", "y", "z", "a", "b", "c")
@@ -82,7 +82,7 @@ def machine_reach(model: MachineModel, stroke_mm: tuple[float, float] | None = N
         tips = zero.contact.tip_M_mm + change[:, :3]
         wanted = compose(rotation_matrix(change[:, 3:]), zero.rotation_M_P)
         wanted = np.where(fixed[3:].any(), wanted, attitude)
-        found = inverse_by_actuators(mechanism, model.actuators, tips, tip_P_mm, wanted, guess_mm)
+        found = inverse_kinematics(mechanism, model.actuators, tips, tip_P_mm, wanted, guess_mm)
         for way in np.flatnonzero(going):
             if found.pose.reason[way]:
                 near = found.pose.reason[way] in (Reason.NEAR_SINGULAR, Reason.OTHER_ASSEMBLY)

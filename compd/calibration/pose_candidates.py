@@ -12,7 +12,7 @@ from compd.errors import CompdError
 from compd.machine_reach import amplification, amplifications, machine_reach, within_stroke
 from compd.model import MachineModel, observe
 from compd.model.effects import Observations
-from compd.model.kinematics import Mechanism, Movement, Pose, inverse_by_actuators, links_at
+from compd.model.kinematics import Mechanism, Movement, Pose, inverse_kinematics, links_at
 from compd.rotation import compose, rotation_matrix, to_outer
 
 # Of the way to a singularity or to the end of the reach along one coordinate, so much is used: several coordinates are
@@ -123,11 +123,11 @@ def reachable(model: MachineModel, poses: FloatArray, stroke_mm: tuple[float, fl
     turns = np.where(fixed[3:], poses[:, 3:], 0.0)
     actuator_mm = np.broadcast_to(zero.actuator_mm, (len(poses), model.scales))
     good = np.ones(len(poses), dtype=bool)
-    at_rest = inverse_by_actuators(mechanism, model.actuators, *zero.contact, zero.rotation_M_P, zero.actuator_mm)
+    at_rest = inverse_kinematics(mechanism, model.actuators, *zero.contact, zero.rotation_M_P, zero.actuator_mm)
     sides = np.sign(_transmission(model, at_rest.pose, at_rest.actuator_mm, at_rest.base_joints_M_mm))
     # followed from machine zero, so that no way crosses a singularity into another assembly
     for share in np.arange(1, _STEPS + 1) / _STEPS:
-        found = inverse_by_actuators(
+        found = inverse_kinematics(
             mechanism,
             model.actuators,
             zero.contact.tip_M_mm + share * (poses[:, :3] - zero.contact.tip_M_mm),

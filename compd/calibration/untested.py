@@ -19,7 +19,7 @@ from compd.calibration.jacobian import pose_columns
 from compd.calibration.machine_fit import MachineFit
 from compd.calibration.pose_candidates import rows_at
 from compd.model import MachineModel
-from compd.model.kinematics import Mechanism, inverse_by_actuators
+from compd.model.kinematics import Mechanism, inverse_kinematics
 from compd.rotation import compose, rotation_matrix, rotation_vector
 
 _SMALLEST_MM = 1e-9
@@ -105,7 +105,7 @@ def _columns(model: MachineModel, fit: MachineFit, tips_M_mm: FloatArray, turns_
     wanted = compose(rotation_matrix(turns_rad), zero.rotation_M_P)
     tips_P_mm = np.broadcast_to(zero.contact.tip_P_mm, tips_M_mm.shape)
     guess_mm = np.broadcast_to(zero.actuator_mm, (len(tips_M_mm), model.scales)).copy()
-    found = inverse_by_actuators(mechanism, model.actuators, tips_M_mm, tips_P_mm, wanted, guess_mm)
+    found = inverse_kinematics(mechanism, model.actuators, tips_M_mm, tips_P_mm, wanted, guess_mm)
     rows = rows_at(model, found.actuator_mm - zero.actuator_mm)
     return pose_columns(model, rows, fit.parameters)[:, :3]
 

@@ -220,7 +220,7 @@ def _result(
         results["warm_origin_M_mm"],
         results["warm_rotation_M_P"],
         memory,
-        results["warm_actuator_mm"][..., :m] if model.by_actuators else None,
+        results["warm_actuator_mm"][..., :m],
     )
     return compensation, warm
 

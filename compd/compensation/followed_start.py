@@ -20,7 +20,7 @@ from compd.model.kinematics import Movement
 def followed_to_target(model: MachineModel, tip_mm: FloatArray) -> WarmStart:
     """At commanded tips (N, 3), in {B0}, with the attitude as at machine zero; where there is no such pose there."""
     start = WarmStart.at_zero(model)
-    if model.attitude_is_free and start.actuator_mm is None:
+    if model.attitude_is_free and model.extends_each:  # its lengths follow from the target at once
         return start
     tip_M_mm = model.arrangement.target_contact(model.frame, tip_mm).tip_M_mm
     pose, scale_mm = model.reach(np.broadcast_to(tip_M_mm, tip_mm.shape))
@@ -29,7 +29,7 @@ def followed_to_target(model: MachineModel, tip_mm: FloatArray) -> WarmStart:
         supports_M_mm=np.broadcast_to(start.supports_M_mm, (len(known), 3, 3)),
         origin_M_mm=np.where(known[:, None], pose.origin_M_mm, start.origin_M_mm),
         rotation_M_P=np.where(known[:, None, None], pose.rotation_M_P, start.rotation_M_P),
-        actuator_mm=None if start.actuator_mm is None else start.actuator_mm + np.where(known[:, None], scale_mm, 0.0),
+        actuator_mm=model.zero.actuator_mm + np.where(known[:, None], scale_mm, 0.0),
     )
 
 
@@ -68,5 +68,5 @@ def first_start(
     return warm._replace(
         origin_M_mm=origin_M_mm.reshape(3),
         rotation_M_P=rotation_M_P.reshape(3, 3),
-        actuator_mm=None if warm.actuator_mm is None or actuator_mm is None else actuator_mm.reshape(-1),
+        actuator_mm=None if actuator_mm is None else actuator_mm.reshape(-1),
     )

@@ -70,7 +70,7 @@ def command_pose(model: MachineModel, wanted: Compensation) -> Compensation:
     pose = Pose(origin_M_mm, attitude, command.link_length_mm[None], solved, np.zeros(1), solved)
     scale_mm = wanted.scale_setpoint_mm[None]
     mechanism, _ = model.links_on(rotation_M_B, model.base_joints_at_0_M_mm[None], scale_mm)
-    by_scale = tip_by_scales(model, mechanism, pose, command.tip_M_mm[None], scale_mm)[0]
+    by_scale = tip_by_scales(model, rotation_M_B, mechanism.base_joints_M_mm, pose, command.tip_M_mm[None], scale_mm)[0]
     contributions = Contributions(wanted.contributions.causes, wanted.contributions.by_cause_mm @ by_scale.T)
     return wanted._replace(
         nominal_scale_mm=_NO_LENGTHS,

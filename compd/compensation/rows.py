@@ -59,7 +59,7 @@ def kernel_rows(model: MachineModel, values: GaugeValues, warm: WarmStart, wante
             _row_copy(warm.supports_M_mm, starts_lead, 2),
             _row_copy(warm.origin_M_mm, starts_lead, 1),
             _row_copy(warm.rotation_M_P, starts_lead, 2),
-            _NO_ACTUATORS if warm.actuator_mm is None else _row_copy(warm.actuator_mm, starts_lead, 1),
+            _row_copy(model.zero.actuator_mm if warm.actuator_mm is None else warm.actuator_mm, starts_lead, 1),
         ),
     )
 
@@ -94,7 +94,6 @@ def _unread(count: int) -> WantedRows:
 
 # What is handed over where nothing is wanted: the kernel does not read it.
 _UNREAD = _unread(1)
-_NO_ACTUATORS = np.empty((1, 0))
 
 
 def _row_copy(values: FloatArray | float, lead: tuple[int, ...], core: int) -> FloatArray:

@@ -35,7 +35,7 @@ class WarmStart(NamedTuple):
 
     supports_M_mm : (..., 3, 3).  origin_M_mm : (..., 3), rotation_M_P : (..., 3, 3), of the moving platform.
     effects : what the model's effects remember; of N rows, after the last one.
-    actuator_mm : (..., m), where the inverse takes the actuators as its unknowns; else None.
+    actuator_mm : (..., m); None in recordings that lack it: machine zero's.
     """
 
     supports_M_mm: FloatArray
@@ -52,7 +52,7 @@ class WarmStart(NamedTuple):
             model.frame.zero_supports_M_mm,
             zero.platform_origin_M_mm,
             zero.rotation_M_P,
-            actuator_mm=zero.actuator_mm if model.by_actuators else None,
+            actuator_mm=zero.actuator_mm,
         )
 
 

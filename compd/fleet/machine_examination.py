@@ -234,7 +234,8 @@ def _kinematics(aligned: AlignedRecording) -> str:
     model = aligned.model
     if model is None:
         return EXTERNAL
-    if not model.by_actuators:
-        return KINEMATICS[aligned.rows.links]
+    drawn = model.extends_each and model.links in KINEMATICS and not model.hinges[:, 1].any()
+    if drawn and model.actuators.fixed[:3].all():
+        return KINEMATICS[model.links]
     kinds = sorted({ACTUATOR_KINDS[kind] for kind in model.actuators.kinds})
     return f"{model.links} rods, {model.scales} actuators: {', '.join(kinds)}"

@@ -25,8 +25,6 @@ from compd.model.kinematics import (
     base_pose,
     distances_mm,
     forward_kinematics,
-    hinges_on_platform,
-    inverse_by_actuators,
     inverse_kinematics,
     link_forces,
     links_at,
@@ -140,9 +138,8 @@ class MachineModel:
         model["hinges"][: len(self.hinges)] = self.hinges
         model["joint_weights"][:n, :k] = self.joint_weights
         model["zero_base_joints_M_mm"][:n] = self.base_joints_at_0_M_mm
-        model["zero_link_length_mm"][:n] = self.zero.link_length_mm
         model["zero_distances_mm"] = self.zero.distances_mm
-        model["by_actuators"] = self.by_actuators
+        model["extends_each"] = self.extends_each
         for name in ("kinds", "cosine_M", "sine_M", "radius_mm", "of_link", "rod_length_mm", "fixed"):
             values = getattr(self.actuators, name)
             model[name][: len(values)] = values
@@ -150,13 +147,9 @@ class MachineModel:
         return structure
 
     @cached_property
-    def by_actuators(self) -> bool:
-        """Whether the inverse takes the actuators as its unknowns; else `inverse_kinematics` gives the lengths."""
-        extended = not self.actuators.kinds.any() and np.array_equal(self.actuators.of_link, np.arange(self.scales))
-        of_links = hinges_on_platform(len(self.hinges))
-        free = 3 if len(self.hinges) else 6
-        fixed = self.actuators.fixed[:free].all() and not self.actuators.fixed[free:].any()
-        return not (extended and np.array_equal(self.hinges, of_links) and fixed and len(self.hinges) in (0, 3))
+    def extends_each(self) -> bool:
+        """Whether each link has an actuator of its own that extends it."""
+        return self.scales == self.links and not self.actuators.kinds.any()
 
     @cached_property
     def base_joints_at_0_M_mm(self) -> FloatArray:
@@ -186,18 +179,11 @@ class MachineModel:
         # followed from machine zero: Newton alone finds another assembly, or none, of a far place
         for share in np.arange(1, _REACH_STEPS + 1) / _REACH_STEPS:
             here_M_mm = zero.contact.tip_M_mm + share * (tip_M_mm - zero.contact.tip_M_mm)
-            if self.by_actuators:
-                reached = inverse_by_actuators(
-                    mechanism, self.actuators, here_M_mm, tip_P_mm, rotation_M_P, actuator_mm
-                )
-                pose, actuator_mm = reached.pose, reached.actuator_mm
-            else:
-                pose = inverse_kinematics(mechanism, here_M_mm, tip_P_mm, rotation_M_P)
+            reached = inverse_kinematics(mechanism, self.actuators, here_M_mm, tip_P_mm, rotation_M_P, actuator_mm)
+            pose, actuator_mm = reached.pose, reached.actuator_mm
             if not self.actuators.fixed[3:].any():
                 rotation_M_P = pose.rotation_M_P
-        if self.by_actuators:
-            return Reach(pose, actuator_mm - zero.actuator_mm)
-        return Reach(pose, pose.link_length_mm - zero.link_length_mm)
+        return Reach(pose, actuator_mm - zero.actuator_mm)
 
     @cached_property
     def extended(self) -> BoolArray:
@@ -295,7 +281,7 @@ def machine_model(parts: MachineParts) -> MachineModel:
     attitude = (
         _parallel_attitude(base_joints, platform_joints) if parts.zero_rotation_M_P is None else parts.zero_rotation_M_P
     )
-    reached = inverse_by_actuators(mechanism, parts.actuators, *parts.zero_contact, attitude, parts.actuator_guess_mm)
+    reached = inverse_kinematics(mechanism, parts.actuators, *parts.zero_contact, attitude, parts.actuator_guess_mm)
     pose = reached.pose
     check = "check the tip and the attitude at machine zero, base joints, platform joints and revolute axes"
     require(pose.reason, "links at machine zero", check)

@@ -20,11 +20,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from compd.compensation import GaugeValues, WarmStart, compensate_cmm, compensate_machine_tool
-from compd.model.kinematics import distances_mm, forward_kinematics, inverse_kinematics, solve_frame
+from compd.model.kinematics import distances_mm, forward_kinematics, solve_frame
 from compd.rotation import to_inner
 from tests.benchmarks.figures import median_and_p99, show
 from tests.benchmarks.limits import run_limited
-from tests.support.model_machines import tripod
+from tests.support.model_machines import inverse_pose, tripod
 
 SOURCE = Path(__file__).with_name("kinematics.c")
 ROWS = 10_000
@@ -88,7 +88,7 @@ def tasks() -> Mapping[str, Task]:
             pose,
         ),
         "tripod inverse": Task(
-            lambda rows: inverse_kinematics(mechanism, rows, zero.contact.tip_P_mm, zero.rotation_M_P),
+            lambda rows: inverse_pose(MODEL, mechanism, rows, zero.contact.tip_P_mm, zero.rotation_M_P),
             tips,
             "inverse_rows",
             mechanism[:3],

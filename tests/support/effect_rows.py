@@ -11,10 +11,10 @@ from scipy.spatial.transform import Rotation
 
 from compd.model import MachineModel, effect_deltas, machine_constants, observe
 from compd.model.effects import Effect, MachineDetails, Observations
-from compd.model.kinematics import Movement, inverse_kinematics
+from compd.model.kinematics import Movement
 from compd.model.library import load_library
 from compd.model.library.scale import PERIODS_MM
-from tests.support.model_machines import Floats, hexapod, tips, tripod
+from tests.support.model_machines import Floats, hexapod, inverse_pose, tips, tripod
 
 DETAILS = MachineDetails(plate_thickness_mm=200.0, scale_signal_period_mm=0.020)
 TRIPOD, HEXAPOD = tripod(), hexapod()
@@ -36,8 +36,8 @@ def rows_at_tips(
     """Rows at these tips with perfect gauges; `values` by quantity, `given` by argument of `observe`."""
     count, n, k = len(tip_M_mm), model.links, model.joint_weights.shape[1]
     zero = model.zero
-    pose = inverse_kinematics(
-        model.mechanism(zero.base_joints_M_mm), tip_M_mm, zero.contact.tip_P_mm, zero.rotation_M_P
+    pose = inverse_pose(
+        model, model.mechanism(zero.base_joints_M_mm), tip_M_mm, zero.contact.tip_P_mm, zero.rotation_M_P
     )
     arguments: dict[str, Any] = {
         "scale_mm": pose.link_length_mm - zero.link_length_mm,

@@ -12,13 +12,11 @@ from compd.configuration import load
 from compd.gauge import ReadingMotion, good
 from compd.live.memory import Readings
 from compd.live.record import RecordedCycles, replay_cycles
-from compd.model import MachineModel
+from compd.model import MachineModel, sensitivities
 from compd.model.effects import evaluate_basis
 from compd.model.kinematics import (
     forward_kinematics,
-    inverse_kinematics,
     links_at,
-    pose_derivatives,
     track_motion,
 )
 from compd.rotation import compose, rotation_matrix, rotation_vector
@@ -26,6 +24,7 @@ from tests.support.effect_rows import HEXAPOD, LIBRARY, TRIPOD, constants_of, ob
 from tests.support.formulas import written
 from tests.support.live_machine import RAW_AT_ZERO_MM, machine
 from tests.support.live_models import with_noise
+from tests.support.model_machines import inverse_pose
 from tests.support.paths import CONFIG, ROOT
 
 FILES = ROOT / "tests" / "guard" / "files-0.2"
@@ -39,6 +38,7 @@ def use_all_kernels() -> None:
     for model in (TRIPOD, HEXAPOD):
         _pose(model, random)
         rows = observe_rows(model, random_inputs(model))
+        sensitivities(model, rows, ["scale"])
         for effect in LIBRARY.values():
             evaluate_basis(effect, rows, constants_of(effect), None)
     # whether w is a period is seen from the formula's values
@@ -54,11 +54,10 @@ def _pose(model: MachineModel, random: np.random.Generator) -> None:
     zero = model.zero
     mechanism = model.mechanism(zero.base_joints_M_mm)
     tip_M_mm = zero.contact.tip_M_mm + random.uniform(-60, 60, (50, 3))
-    pose = inverse_kinematics(mechanism, tip_M_mm, zero.contact.tip_P_mm, zero.rotation_M_P)
+    pose = inverse_pose(model, mechanism, tip_M_mm, zero.contact.tip_P_mm, zero.rotation_M_P)
     forward_kinematics(mechanism, pose.link_length_mm, pose.origin_M_mm, pose.rotation_M_P)
     moved_mm = random.normal(size=(50, model.links))
     links_at(model.actuators, zero.base_joints_M_mm, moved_mm)
-    pose_derivatives(mechanism, model.actuators, moved_mm, pose.origin_M_mm, pose.rotation_M_P)
     track_motion(None, np.arange(50.0), moved_mm, random.normal(size=(50, 2)))
 
 

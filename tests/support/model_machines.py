@@ -10,7 +10,15 @@ import pytest
 from numpy.typing import NDArray
 
 from compd.model import MachineModel, MachineParts, machine_model
-from compd.model.kinematics import Actuators, Contact, ToolOnPlate, ToolOnPlatform
+from compd.model.kinematics import (
+    Actuators,
+    Contact,
+    Mechanism,
+    Pose,
+    ToolOnPlate,
+    ToolOnPlatform,
+    inverse_kinematics,
+)
 from tests.support.paths import VECTORS
 
 Floats = NDArray[np.float64]
@@ -47,6 +55,13 @@ def rotation(axis: str, degrees: float) -> Floats:
     j, k = (i + 1) % 3, (i + 2) % 3
     R[j, j], R[j, k], R[k, j], R[k, k] = c, -s, s, c
     return R
+
+
+def inverse_pose(
+    model: MachineModel, mechanism: Mechanism, tip_M_mm: Floats, tip_P_mm: Floats, rotation_M_P: Floats
+) -> Pose:
+    """The pose at a contact, from the actuators of machine zero."""
+    return inverse_kinematics(mechanism, model.actuators, tip_M_mm, tip_P_mm, rotation_M_P, model.zero.actuator_mm).pose
 
 
 def extending(links: int) -> dict[str, Any]:

@@ -18,7 +18,7 @@ from compd.live.service.message_keys.budget import BudgetKeys
 from compd.model import MachineModel, tip_by_scales
 from compd.model.external import ExternalModel
 from compd.model.kernels import Reason
-from compd.model.kinematics import Mechanism, Pose, forward_kinematics
+from compd.model.kinematics import Pose, forward_kinematics
 from compd.rotation import compose, rotation_matrix, rotation_vector, to_inner, to_outer
 from compd.setpoint_states import Mode
 from compd.units import UM_PER_MM
@@ -64,11 +64,11 @@ class BudgetMessage:
         if "tip_correction_mm" in setpoint:
             return self._pose_values(setpoint)
         scale_mm = _scale_mm(setpoint)
-        supports, mechanism, pose = self._pose(setpoint, scale_mm)
+        supports, rotation_M_B, base_joints, pose = self._pose(setpoint, scale_mm)
         if pose.reason[0] != Reason.OK:
             return {}
         tip_M_mm = np.array([setpoint["tip_M_mm"]])
-        by_scale = tip_by_scales(self._machine, mechanism, pose, tip_M_mm, scale_mm)[0]
+        by_scale = tip_by_scales(self._machine, rotation_M_B, base_joints, pose, tip_M_mm, scale_mm)[0]
         contributions_um = {
             cause: _um(-by_scale @ np.array(scales_mm)) for cause, scales_mm in setpoint["sources_mm"].items()
         }
@@ -79,7 +79,7 @@ class BudgetMessage:
             **shadow,
             "supports_M_mm": supports.round(_DECIMALS_MM).tolist(),
             "supports_moved_um": _um(supports - self._machine.frame.zero_supports_M_mm),
-            "base_joints_M_mm": mechanism.base_joints_M_mm[0].round(_DECIMALS_MM).tolist(),
+            "base_joints_M_mm": base_joints[0].round(_DECIMALS_MM).tolist(),
             "platform": {
                 "origin_M_mm": pose.origin_M_mm[0].round(_DECIMALS_MM).tolist(),
                 "rotation_M_rad": rotation_vector(pose.rotation_M_P[0]).round(_DECIMALS_RAD).tolist(),
@@ -89,8 +89,11 @@ class BudgetMessage:
             },
         }
 
-    def _pose(self, setpoint: Mapping[str, Any], scale_mm: FloatArray) -> tuple[FloatArray, Mechanism, Pose]:
-        """Supports (3, 3) in {M}, and the links, carried along by the base platform as a whole; the moving platform."""
+    def _pose(
+        self, setpoint: Mapping[str, Any], scale_mm: FloatArray
+    ) -> tuple[FloatArray, FloatArray, FloatArray, Pose]:
+        """Supports (3, 3) in {M}, the base's axes, and base joints (1, n, 3), carried along by the base platform as a
+        whole; the moving platform."""
         frame = setpoint["frame"]
         rotation = compose(rotation_matrix(np.array(frame["rotation_M_rad"])), self._machine.frame.zero_rotation_M_B)
         origin_M_mm = np.array(frame["origin_M_mm"])
@@ -100,7 +103,7 @@ class BudgetMessage:
         mechanism, _ = self._machine.links_on(rotation, base_joints, scale_mm)
         lengths = np.array([setpoint["link_length_mm"]])
         pose = forward_kinematics(mechanism, lengths, zero.platform_origin_M_mm, zero.rotation_M_P)
-        return supports, mechanism, pose
+        return supports, rotation, mechanism.base_joints_M_mm, pose
 
 
 def _scale_mm(setpoint: Mapping[str, Any]) -> FloatArray:

@@ -22,6 +22,7 @@ from .effect_needs import needed_quantities as needed_quantities
 from .effect_needs import unmet_needs as unmet_needs
 from .effect_program import EffectProgram as EffectProgram
 from .effect_program import build_program as build_program
+from .effect_program import port_numbers as port_numbers
 from .observations import AtZero as AtZero
 from .observations import MachineConstants as MachineConstants
 from .observations import MachineDetails as MachineDetails

@@ -33,6 +33,13 @@ LIVE_PORTS: tuple[Port, ...] = (
 _LEVELS: Mapping[Port, int] = {"scale": LENGTHS, "joint": LENGTHS, "link": LENGTHS, "frame": FRAME, "plate": FRAME}
 
 
+def port_numbers(links: int, joints: int, axes: int) -> dict[Port, range]:
+    """The places of each port's numbers among those of all."""
+    sizes = port_sizes(links, joints, axes)
+    ends = accumulate((sizes[port] for port in LIVE_PORTS), initial=0)
+    return {port: range(*each) for port, each in zip(LIVE_PORTS, pairwise(ends), strict=True)}
+
+
 class EffectProgram(NamedTuple):
     """K effects of a machine as the kernel reads them.
 
@@ -82,7 +89,7 @@ def build_program(
 ) -> EffectProgram:
     """The program of live effects on a machine with so many links, joint comparators and revolute axes."""
     sizes = port_sizes(links, joints, axes)
-    begins = dict(zip(LIVE_PORTS, accumulate((sizes[port] for port in LIVE_PORTS), initial=0), strict=False))
+    numbers = port_numbers(links, joints, axes)
     all_needed = (name for each in fitted for name in needed_quantities(each.effect, links))
     quantities = {name: index for index, name in enumerate(dict.fromkeys(all_needed))}
     references: dict[tuple[str, float | None], int] = {}
@@ -94,7 +101,7 @@ def build_program(
         effect = each.effect
         structure["level"] = max(_LEVELS.get(port, MECHANISM) for port in effect.ports)
         structure["targets_begin"] = len(targets)
-        targets += [begins[port] + i for port in effect.ports for i in range(sizes[port])]
+        targets += [number for port in effect.ports for number in numbers[port]]
         structure["size"] = len(targets) - structure["targets_begin"]
         own: dict[str, Any] = {"theta": each.theta, "numbers": [], "code": np.zeros((0, 2), dtype=np.int64)}
         own |= {"quantities": [], "memory": []}
@@ -133,6 +140,6 @@ def build_program(
         tuple(quantities),
         tuple(references),
         states,
-        sum(sizes[port] for port in LIVE_PORTS),
+        numbers[LIVE_PORTS[-1]].stop,
         tuple(np.flatnonzero(effects["number"] == GIVEN).tolist()),
     )

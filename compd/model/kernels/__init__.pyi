@@ -1,13 +1,11 @@
 from . import formula as formula
-from .actuated_links import actuated_inverse as actuated_inverse
+from .actuated_links import inverse as inverse
 from .actuated_links import placed_links as placed_links
-from .actuated_links import pose_by_actuators as pose_by_actuators
 from .compensation import compensate_rows as compensate_rows
 from .effect_dispatch import FORMULA as FORMULA
 from .effect_dispatch import kernel_number as kernel_number
 from .effect_rows import basis_of_rows as basis_of_rows
 from .forward_solver import forward as forward
-from .inverse_solver import inverse as inverse
 from .joints import joint_shortening as joint_shortening
 from .link_forces import forces as forces
 from .loop_closure import closure as closure
@@ -19,6 +17,7 @@ from .row_arguments import EffectArrays as EffectArrays
 from .row_arguments import GaugeRows as GaugeRows
 from .row_arguments import GivenRows as GivenRows
 from .row_arguments import MemoryArrays as MemoryArrays
+from .row_arguments import PoseRows as PoseRows
 from .row_arguments import RowOptions as RowOptions
 from .row_arguments import SolvedRows as SolvedRows
 from .row_arguments import TipDerivativeArrays as TipDerivativeArrays
@@ -28,3 +27,5 @@ from .solve_status import AMPLIFICATION_LIMIT as AMPLIFICATION_LIMIT
 from .solve_status import Reason as Reason
 from .solve_status import require as require
 from .tip_derivatives import set_tip_derivatives as set_tip_derivatives
+from .tip_sensitivity import DIFFERENCE_STEP_MM as DIFFERENCE_STEP_MM
+from .tip_sensitivity import set_sensitivities as set_sensitivities

@@ -7,7 +7,8 @@ With q the place of an actuator in mm and u, v unit vectors in {M}, the base joi
     TURNS      a = a0 + radius (cos(q/radius) u + sin(q/radius) v),   l = l0
 
 (q of a turning actuator is the arc, radius times the angle). The inverse solves the closure for the m actuators and the
-6 - m coordinates of the platform that the target leaves free, by Newton's method: six equations for six unknowns.
+6 - m coordinates of the platform that the target leaves free, by Newton's method: six equations for six unknowns. Where
+each link has an actuator of its own that extends it, the actuators follow from each pose: a hexapod takes no step.
 """
 
 from __future__ import annotations
@@ -114,21 +115,25 @@ def _origin_at(tip_M: FloatArray, R: FloatArray, tip_P: FloatArray, origin_M: Fl
 
 @helper
 def _free_step(
-    J: FloatArray, by_actuator: FloatArray, fixed: IntArray, M: FloatArray, pivot: IntArray, x: FloatArray
+    J: FloatArray, by_actuator: FloatArray, fixed: IntArray, first: int, M: FloatArray, pivot: IntArray, x: FloatArray
 ) -> float:
-    """Solve for the free coordinates and the actuators, x (6,) in place; returns the determinant's sign."""
-    column = 0
+    """Solve the rows from `first` on for the free coordinates and, where that is 0, the actuators.
+
+    x (6,) : in place, the step by the coordinates, and then by the actuators.  Returns the determinant's sign.
+    """
+    size, column = 6 - first, 0
     for c in range(6):
         if fixed[c] == 0:
-            for i in range(6):
-                M[i, column] = J[i, c]
+            for i in range(size):
+                M[i, column] = J[first + i, c]
             column += 1
-    for i in range(6):
-        for a in range(by_actuator.shape[1]):
+    for i in range(size):
+        x[i] = x[first + i]
+        for a in range(size - column):
             M[i, column + a] = by_actuator[i, a]
-    sign = lu_factor(M, pivot)
+    sign = lu_factor(M[:size, :size], pivot)
     if sign != 0.0:
-        lu_solve(M, pivot, x)
+        lu_solve(M[:size, :size], pivot, x[:size])
     return sign
 
 
@@ -136,58 +141,57 @@ def _free_step(
 def _move_freely(
     fixed: IntArray,
     x: FloatArray,
-    share: float,
     size_mm: float,
     place: FloatArray,
     R: FloatArray,
     actuator_mm: FloatArray,
-) -> None:
-    """Take a share of the step x of `_free_step`, in the free coordinates and the actuators."""
-    turn = np.zeros(3)
+    moved: FloatArray,
+) -> float:
+    """Take the step x of `_free_step`, a long one shortened; returns its length.  moved (6,) : room."""
+    step = max_abs(x)
+    share = STEP_LIMIT * size_mm / max(step, STEP_LIMIT * size_mm)
     column = 0
     for c in range(6):
+        moved[c] = 0.0
         if fixed[c] == 0:
-            if c < 3:
-                place[c] += share * x[column]
-            else:
-                turn[c - 3] = share * x[column] / size_mm
+            moved[c] = share * x[column]
             column += 1
-    rotate_in_place(R, turn[0], turn[1], turn[2])
-    for a in range(actuator_mm.shape[0]):
-        actuator_mm[a] += share * x[column + a]
+    place += moved[:3]
+    rotate_in_place(R, moved[3] / size_mm, moved[4] / size_mm, moved[5] / size_mm)
+    for i in range(column, x.shape[0]):
+        actuator_mm[i - column] += share * x[i]
+    return step
 
 
 @helper
 def _check_solution(
-    J: FloatArray, pivot: IntArray, residual_mm: float, same_sign: bool, R: FloatArray, attitude_R: FloatArray
+    J: FloatArray,
+    room: FloatArray,
+    pivot: IntArray,
+    residual_mm: float,
+    same_sign: bool,
+    R: FloatArray,
+    attitude_R: FloatArray,
 ) -> int:
-    """The reason of a pose that Newton's method ended at; J is overwritten."""
+    """The reason of a pose that Newton's method ended at; J and room (6, 6) are overwritten."""
     if residual_mm > RESIDUAL_TOLERANCE_MM:
         return NO_CONVERGENCE
-    if lu_factor(J, pivot) == 0.0 or inverse_norm(J, np.empty((6, 6))) > AMPLIFICATION_LIMIT:
+    if lu_factor(J, pivot) == 0.0 or inverse_norm(J, room) > AMPLIFICATION_LIMIT:
         return NEAR_SINGULAR
     return OK if same_sign and not is_turned_over(R, attitude_R) else OTHER_ASSEMBLY
 
 
 @helper
-def _set_lone_extended(
-    kinds: IntArray,
-    actuator_of_link: IntArray,
-    rod_length_mm: FloatArray,
-    value_mm: FloatArray,
-    actuator_mm: FloatArray,
-    lengths_mm: FloatArray,
+def extend(
+    actuator_of_link: IntArray, rod_length_mm: FloatArray, lengths_mm: FloatArray, actuator_mm: FloatArray
 ) -> None:
-    """Where each actuator has one link, an extended one is as long as its joints are apart, to the last bit."""
+    """Set actuators that each extend one link of their own to the links' lengths."""
     for i in range(actuator_of_link.shape[0]):
-        a = actuator_of_link[i]
-        if kinds[a] == EXTENDS and actuator_of_link.shape[0] == kinds.shape[0]:
-            lengths_mm[i] += value_mm[i]
-            actuator_mm[a] = lengths_mm[i] - rod_length_mm[i]
+        actuator_mm[actuator_of_link[i]] = lengths_mm[i] - rod_length_mm[i]
 
 
 @helper
-def solve_actuated_inverse(
+def solve_inverse(
     base_joints_M: FloatArray,
     platform_joints_P: FloatArray,
     revolute_axes: FloatArray,
@@ -212,20 +216,20 @@ def solve_actuated_inverse(
     residual_mm: FloatArray,
     reason: IntArray,
 ) -> None:
-    """See `compd.model.kinematics.actuators.inverse_by_actuators`."""
+    """See `compd.model.kinematics.actuators.inverse_kinematics`."""
     n, m = actuator_of_link.shape[0], kinds.shape[0]
     actuator_mm[:] = guess_mm
     R[:, :] = attitude_R
     iterations[0], residual_mm[0] = 0, math.nan
     size_mm = platform_radius(platform_joints_P)
     place = tip_M.copy()
-    value, x = np.empty(6), np.empty(6)
+    value, pivot = np.empty(6), np.empty(6, np.int64)
     J, M, by_actuator = np.empty((6, 6)), np.empty((6, 6)), np.empty((6, m))
-    pivot = np.empty(6, np.int64)
     finite = pose_is_finite(base_joints_M, platform_joints_P, revolute_axes, tip_M, R)
-    finite &= all_finite(tip_P) and all_finite(guess_mm)
+    finite &= all_finite(tip_P) and all_finite(guess_mm) and all_finite(rod_length_mm)
     reason[0] = (OK if size_mm > 0.0 else NEAR_SINGULAR) if finite else NOT_FINITE
-    step, sign, first_sign = math.inf, 0.0, 0.0
+    extends_each = n == m and not kinds.any()
+    step, sign, first_sign = 0.0 if extends_each and n == 6 else math.inf, 0.0, 0.0
     while reason[0] == OK:
         _origin_at(place, R, tip_P, origin_M)
         place_links(
@@ -235,97 +239,50 @@ def solve_actuated_inverse(
         if not evaluate_closure(origin_M, R, joints_M, platform_joints_P, revolute_axes, hinges, size_mm, value, J):
             reason[0] = UNREACHABLE
             break
+        if extends_each:
+            lengths_mm[:] = value[:n]
+            extend(actuator_of_link, rod_length_mm, lengths_mm, actuator_mm)
         value[:n] -= lengths_mm
         if step <= STEP_TOLERANCE_MM:
             break
         if iterations[0] == ITERATION_LIMIT:
             reason[0] = NO_CONVERGENCE
             break
-        closure_by_actuators(kinds, cosine_M, sine_M, radius_mm, actuator_of_link, hinges, actuator_mm, J, by_actuator)
+        if not extends_each:
+            closure_by_actuators(
+                kinds, cosine_M, sine_M, radius_mm, actuator_of_link, hinges, actuator_mm, J, by_actuator
+            )
         _rows_by_tip(J, R, tip_P, size_mm)
-        x[:] = -value
-        sign = _free_step(J, by_actuator, fixed, M, pivot, x)
+        value[:] = -value
+        first = n if extends_each else 0
+        sign = _free_step(J, by_actuator, fixed, first, M, pivot, value)
         if sign == 0.0:
             reason[0] = NEAR_SINGULAR
             break
         if iterations[0] == 0:
             first_sign = sign
-        step = max_abs(x)
-        shortened = STEP_LIMIT * size_mm / max(step, STEP_LIMIT * size_mm)
-        _move_freely(fixed, x, shortened, size_mm, place, R, actuator_mm)
+        step = _move_freely(fixed, value[: 6 - first], size_mm, place, R, actuator_mm, M[0])
         iterations[0] += 1
     if reason[0] == OK:
-        orthonormalise(R)
+        if iterations[0] > 0:
+            orthonormalise(R)
         residual_mm[0] = max_abs(value)
-        _set_lone_extended(kinds, actuator_of_link, rod_length_mm, value, actuator_mm, lengths_mm)
-        reason[0] = _check_solution(J, pivot, residual_mm[0], sign == first_sign, R, attitude_R)
+        reason[0] = _check_solution(J, M, pivot, residual_mm[0], sign == first_sign, R, attitude_R)
     if reason[0] != OK:
-        origin_M[:] = math.nan
-        R[:, :] = math.nan
-        actuator_mm[:] = math.nan
-        lengths_mm[:] = math.nan
-        joints_M[:, :] = math.nan
+        origin_M[:] = actuator_mm[:] = lengths_mm[:] = math.nan
+        R[:, :] = joints_M[:, :] = math.nan
 
 
-actuated_inverse = kernel(
+inverse = kernel(
     [
         *[MATRIX, MATRIX, MATRIX, INTEGER_ROWS, INTEGERS, MATRIX, MATRIX, VECTOR, INTEGERS, VECTOR, INTEGERS],
         *[VECTOR, VECTOR, MATRIX, VECTOR, VECTOR, MATRIX, VECTOR, VECTOR, MATRIX, INTEGERS, VECTOR, INTEGERS],
     ],
     "(n,d),(n,d),(k,d),(k,c),(m),(m,d),(m,d),(m),(n),(n),(s),(d),(d),(d,d),(m)->(d),(d,d),(m),(n),(n,d),(),(),()",
-)(solve_actuated_inverse)
+)(solve_inverse)
 
 
 placed_links = kernel(
     [INTEGERS, MATRIX, MATRIX, VECTOR, INTEGERS, MATRIX, VECTOR, VECTOR, MATRIX, VECTOR],
     "(m),(m,d),(m,d),(m),(n),(n,d),(n),(m)->(n,d),(n)",
 )(place_links)
-
-
-@kernel(
-    [
-        *[MATRIX, MATRIX, MATRIX, INTEGER_ROWS, INTEGERS, MATRIX, MATRIX, VECTOR, INTEGERS],
-        *[VECTOR, VECTOR, MATRIX, VECTOR, MATRIX, INTEGERS],
-    ],
-    "(n,d),(n,d),(k,d),(k,c),(m),(m,d),(m,d),(m),(n),(m),(d),(d,d),(s)->(s,m),()",
-)
-def pose_by_actuators(
-    joints_M: FloatArray,
-    platform_joints_P: FloatArray,
-    revolute_axes: FloatArray,
-    hinges: IntArray,
-    kinds: IntArray,
-    cosine_M: FloatArray,
-    sine_M: FloatArray,
-    radius_mm: FloatArray,
-    actuator_of_link: IntArray,
-    actuator_mm: FloatArray,
-    origin_M: FloatArray,
-    R: FloatArray,
-    six: FloatArray,
-    by_actuator: FloatArray,
-    reason: IntArray,
-) -> None:
-    """See `compd.model.kinematics.actuators.pose_derivatives`. `six` is not read: it gives the size of the result."""
-    m = kinds.shape[0]
-    value, x = np.empty(6), np.empty(6)
-    J, pivot = np.empty((6, 6)), np.empty(6, np.int64)
-    reason[0] = OK
-    if not (pose_is_finite(joints_M, platform_joints_P, revolute_axes, origin_M, R) and all_finite(actuator_mm)):
-        reason[0] = NOT_FINITE
-    elif not evaluate_closure(origin_M, R, joints_M, platform_joints_P, revolute_axes, hinges, 1.0, value, J):
-        reason[0] = NEAR_SINGULAR
-    if reason[0] == OK:
-        demand = np.empty((6, m))
-        closure_by_actuators(kinds, cosine_M, sine_M, radius_mm, actuator_of_link, hinges, actuator_mm, J, demand)
-        if lu_factor(J, pivot) == 0.0:
-            reason[0] = NEAR_SINGULAR
-        else:
-            for a in range(m):
-                for i in range(6):
-                    x[i] = -demand[i, a]
-                lu_solve(J, pivot, x)
-                for i in range(6):
-                    by_actuator[i, a] = x[i]
-    if reason[0] != OK:
-        by_actuator[:, :] = math.nan

@@ -15,8 +15,6 @@ from compd.model.kernels.joints import shorten_by_joints
 from compd.model.kernels.machine_solver import (
     copy_frame,
     copy_pose,
-    forward_pose,
-    inverse_pose,
     set_contact,
     set_distances,
     solve_frame,
@@ -60,80 +58,14 @@ def _solve_bare(
 ) -> None:
     """Row r of the cycle without effects: equations (1) to (9)."""
     scale_mm, joint_mm, frame_mm = gauges.scale_mm[r], gauges.joint_mm[r], gauges.frame_mm[r]
-    attitude_M_P = wanted.attitude_M_P[r]
     w = min(r, warm.supports_M_mm.shape[0] - 1)
-    n, k = model.links, joint_mm.shape[0]
+    n, m, k = model.links, model.scales, joint_mm.shape[0]
     distances_mm = np.empty(9)
     set_distances(model, frame_mm, distances_mm)
     frame, pose = result.bare_frame, result.bare_pose
     solve_frame(model, model.plate_points_M_mm, distances_mm, warm.supports_M_mm[w], frame)
-    if model.by_actuators:
-        _solve_by_actuators(
-            model, machine_tool, scale_mm, joint_mm, attitude_M_P, warm, w, work, result, contributions_mm
-        )
-        return
-    shorten_by_joints(model.joint_weights[:n, :k], joint_mm, contributions_mm[0], work.altered.joint_reason)
-    base_M_mm, zero_base_M_mm = frame.base_joints_M_mm, model.zero_base_joints_M_mm
-    if machine_tool:
-        inverse_pose(model, zero_base_M_mm, model, result.target_M_mm, result.target_P_mm, attitude_M_P, work.nominal)
-        inverse_pose(model, base_M_mm, model, result.target_M_mm, result.target_P_mm, attitude_M_P, pose)
-        copy_pose(pose, work.command)
-        result.tip_M_mm[:] = result.target_M_mm
-        result.tip_P_mm[:] = result.target_P_mm
-    else:
-        length_mm = np.empty(n)
-        nominal_mm = np.empty(n)
-        for i in range(n):
-            nominal_mm[i] = model.zero_link_length_mm[i] + scale_mm[i]
-            length_mm[i] = nominal_mm[i] - contributions_mm[0, i]
-        forward_pose(model, base_M_mm, model, length_mm, warm.origin_M_mm[w], warm.rotation_M_P[w], pose)
-        forward_pose(model, zero_base_M_mm, model, nominal_mm, warm.origin_M_mm[w], warm.rotation_M_P[w], work.nominal)
-        set_contact(model, work.nominal, model.tool_mm, result.target_M_mm, result.target_P_mm)
-        inverse_pose(
-            model,
-            base_M_mm,
-            model,
-            result.target_M_mm,
-            result.target_P_mm,
-            work.nominal.rotation_M_P,
-            work.command,
-        )
-        set_contact(model, pose, model.tool_mm, result.tip_M_mm, result.tip_P_mm)
-    for i in range(n):
-        length_mm_i = work.command.link_length_mm[i]
-        nominal_mm_i = work.nominal.link_length_mm[i]
-        result.nominal_scale_mm[i] = nominal_mm_i - model.zero_link_length_mm[i] if machine_tool else scale_mm[i]
-        result.scale_setpoint_mm[i] = length_mm_i - model.zero_link_length_mm[i] + contributions_mm[0, i]
-        contributions_mm[1, i] = length_mm_i - nominal_mm_i
-    result.reason = max(
-        work.altered.joint_reason[0],
-        frame.reason[0],
-        work.nominal.reason[0],
-        pose.reason[0],
-        work.command.reason[0],
-    )
-    copy_frame(frame, result.frame)
-    copy_pose(pose, result.pose)
-
-
-@helper
-def _solve_by_actuators(
-    model: Any,
-    machine_tool: bool,
-    scale_mm: FloatArray,
-    joint_mm: FloatArray,
-    attitude_M_P: FloatArray,
-    warm: WarmRows,
-    w: int,
-    work: Any,
-    result: Any,
-    contributions_mm: FloatArray,
-) -> None:
-    """As `_solve_bare` behind its frame, of a machine whose inverse takes the actuators as unknowns."""
-    n, m, k = model.links, model.scales, joint_mm.shape[0]
-    frame, pose, nominal, command = result.bare_frame, result.bare_pose, work.nominal, work.command
-    at_zero, standing = work.at_zero, work.standing
-    guess_mm, attitude = np.empty(m), np.empty((3, 3))
+    nominal, command, at_zero, standing = work.nominal, work.command, work.at_zero, work.standing
+    attitude = np.empty((3, 3))
     stand_on(model, model.zero_rotation_M_B, model.zero_base_joints_M_mm, at_zero)
     stand_on(model, frame.rotation_M_B, frame.base_joints_M_mm, standing)
     shortening_mm, reason = np.empty(n), standing.joint_reason
@@ -146,19 +78,18 @@ def _solve_by_actuators(
         standing.joint_shortening_mm[:n] = 0.0
         attitude[:, :] = nominal.rotation_M_P
     else:
-        guess_mm[:] = warm.actuator_mm[w]
-        attitude[:, :] = attitude_M_P
-        inverse_standing(model, at_zero, result.target_M_mm, result.target_P_mm, attitude, guess_mm, nominal)
+        nominal.actuator_mm[:m] = warm.actuator_mm[w]
+        attitude[:, :] = wanted.attitude_M_P[r]
+        inverse_standing(model, at_zero, result.target_M_mm, result.target_P_mm, attitude, False, nominal)
     # what the frame does, and then what the joints do: an actuator may have several links
-    guess_mm[:] = nominal.actuator_mm[:m]
-    inverse_standing(model, standing, result.target_M_mm, result.target_P_mm, attitude, guess_mm, command)
+    command.actuator_mm[:] = nominal.actuator_mm
+    inverse_standing(model, standing, result.target_M_mm, result.target_P_mm, attitude, False, command)
     for a in range(m):
         contributions_mm[1, a] = command.actuator_mm[a] - nominal.actuator_mm[a]
         contributions_mm[0, a] = 0.0
     if k > 0:
         standing.joint_shortening_mm[:n] = shortening_mm
-        guess_mm[:] = command.actuator_mm[:m]
-        inverse_standing(model, standing, result.target_M_mm, result.target_P_mm, attitude, guess_mm, command)
+        inverse_standing(model, standing, result.target_M_mm, result.target_P_mm, attitude, True, command)
         for a in range(m):
             contributions_mm[0, a] = command.actuator_mm[a] - nominal.actuator_mm[a] - contributions_mm[1, a]
     if machine_tool:
@@ -207,8 +138,7 @@ def _set_warm(model: Any, warm: WarmRows, w: int, result: Any) -> None:
     result.warm_supports_M_mm[:, :] = warm.supports_M_mm[w]
     result.warm_origin_M_mm[:] = warm.origin_M_mm[w]
     result.warm_rotation_M_P[:, :] = warm.rotation_M_P[w]
-    if model.by_actuators:
-        result.warm_actuator_mm[: model.scales] = warm.actuator_mm[w]
+    result.warm_actuator_mm[: model.scales] = warm.actuator_mm[w]
 
 
 @helper
@@ -232,23 +162,9 @@ def _solve_altered_pose(
     result: Any,
 ) -> int:
     """Where the tip is in CMM mode on the machine with its effects; returns the reason."""
-    n, altered = model.links, work.altered
-    if model.by_actuators:
-        forward_standing(
-            model,
-            altered,
-            scale_mm + altered.scale_mm[: model.scales],
-            warm_origin_M_mm,
-            warm_rotation_M_P,
-            result.pose,
-        )
-        set_contact(model, result.pose, altered.tool_mm, result.tip_M_mm, result.tip_P_mm)
-        return result.pose.reason[0]  # type: ignore[no-any-return]
-    length_mm = np.empty(n)
-    for i in range(n):
-        length_mm[i] = model.zero_link_length_mm[i] + scale_mm[i] - altered.joint_shortening_mm[i]
-        length_mm[i] += altered.reading_to_length_mm[i]
-    forward_pose(model, altered.base_joints_M_mm, altered, length_mm, warm_origin_M_mm, warm_rotation_M_P, result.pose)
+    altered = work.altered
+    shown_mm = scale_mm + altered.scale_mm[: model.scales]
+    forward_standing(model, altered, shown_mm, warm_origin_M_mm, warm_rotation_M_P, result.pose)
     set_contact(model, result.pose, altered.tool_mm, result.tip_M_mm, result.tip_P_mm)
     return result.pose.reason[0]  # type: ignore[no-any-return]
 

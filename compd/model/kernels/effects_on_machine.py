@@ -14,10 +14,10 @@ from compd.arrays import FloatArray
 from compd.jit import helper
 from compd.model.kernels.effect_dispatch import set_basis
 from compd.model.kernels.joints import shorten_by_joints
-from compd.model.kernels.machine_solver import copy_frame, copy_pose, frame_change_mm, inverse_pose, solve_frame
+from compd.model.kernels.machine_solver import copy_frame, copy_pose, frame_change_mm, solve_frame
 from compd.model.kernels.reason_codes import OK
 from compd.model.kernels.row_arguments import EffectArrays
-from compd.model.kernels.standing_machine import inverse_standing, stand_on
+from compd.model.kernels.standing_machine import inverse_standing, stand_parts
 from compd.model.structures import FRAME, LENGTHS
 from compd.rotation import to_outer_frame
 
@@ -106,6 +106,8 @@ def _add_to_machine(
 ) -> None:
     """The machine with what effects add at its ports, the frame solved anew where its distances or its plate change.
 
+    level : of what has changed; the rest of `altered` is as it was.
+
     The ports' order in `added` is that of `compd.model.effects.effect_program.LIVE_PORTS`.
     """
     n, m, k, a = model.links, model.scales, joint_mm.shape[0], model.axes
@@ -124,22 +126,21 @@ def _add_to_machine(
             plate_points_M_mm[i // 3, i % 3] = model.plate_points_M_mm[i // 3, i % 3] + added[plate + i]
             distances_mm[i] = model.zero_distances_mm[i] + (frame_change_mm(frame_mm, i) + added[m + k + i])
         solve_frame(model, plate_points_M_mm, distances_mm, nominal_frame.supports_M_mm, frame)
-    if model.by_actuators:
-        stand_on(model, frame.rotation_M_B, frame.base_joints_M_mm, altered)
-    else:
-        altered.revolute_axes_P[:, :] = model.revolute_axes_P
     shorten_by_joints(model.joint_weights[:n, :k], reading_mm, altered.joint_shortening_mm[:n], altered.joint_reason)
     for i in range(m):
         altered.scale_mm[i] = added[i]
     for i in range(n):
-        altered.reading_to_length_mm[i] = added[link + i] if model.by_actuators else added[i] + added[link + i]
+        altered.reading_to_length_mm[i] = added[link + i]
+    if level == LENGTHS:
+        return
+    stand_parts(model, frame.rotation_M_B, frame.base_joints_M_mm, altered)
     for j in range(3):
         for i in range(n):
-            altered.base_joints_M_mm[i, j] = frame.base_joints_M_mm[i, j] + added[base + 3 * i + j]
-            altered.platform_joints_P_mm[i, j] = model.platform_joints_P_mm[i, j] + added[platform + 3 * i + j]
+            altered.base_joints_M_mm[i, j] += added[base + 3 * i + j]
+            altered.platform_joints_P_mm[i, j] += added[platform + 3 * i + j]
         for i in range(a):
             altered.revolute_axes_P[i, j] += added[axis + 3 * i + j]
-        altered.tool_mm[j] = model.tool_mm[j] + added[tool + j]
+        altered.tool_mm[j] += added[tool + j]
 
 
 @helper
@@ -169,6 +170,7 @@ def add_effects(
     reason = OK
     copy_frame(result.bare_frame, result.frame)
     copy_pose(work.command, work.with_effects)
+    stand_parts(model, result.frame.rotation_M_B, result.frame.base_joints_M_mm, work.altered)
     for e in range(effects.shape[0]):
         for i in range(total_mm.shape[0]):
             total_mm[i] += added_mm[e, i]
@@ -177,25 +179,12 @@ def add_effects(
             continue
         altered = work.altered
         _add_to_machine(model, total_mm, level, joint_mm, frame_mm, result.bare_frame, result.frame, altered)
-        if level > LENGTHS or model.by_actuators:
-            tip_M_mm[:] = result.target_M_mm
-            tip_P_mm[:] = result.target_P_mm
-            if model.tool_on_plate:
-                tip_M_mm[:] = altered.tool_mm
-            else:
-                tip_P_mm[:] = altered.tool_mm
-            if model.by_actuators:
-                guess_mm = work.command.actuator_mm
-                inverse_standing(model, altered, tip_M_mm, tip_P_mm, attitude_M_P, guess_mm, work.with_effects)
-            else:
-                base_M_mm = altered.base_joints_M_mm
-                inverse_pose(model, base_M_mm, altered, tip_M_mm, tip_P_mm, attitude_M_P, work.with_effects)
+        tip_M_mm[:] = altered.tool_mm if model.tool_on_plate else result.target_M_mm
+        tip_P_mm[:] = result.target_P_mm if model.tool_on_plate else altered.tool_mm
+        work.with_effects.actuator_mm[:] = work.command.actuator_mm
+        inverse_standing(model, altered, tip_M_mm, tip_P_mm, attitude_M_P, level == LENGTHS, work.with_effects)
         for i in range(m):
-            if model.by_actuators:
-                setpoint = work.with_effects.actuator_mm[i] - model.zero_actuator_mm[i] - altered.scale_mm[i]
-            else:
-                length_mm = work.with_effects.link_length_mm[i] - altered.reading_to_length_mm[i]
-                setpoint = length_mm - model.zero_link_length_mm[i] + altered.joint_shortening_mm[i]
+            setpoint = work.with_effects.actuator_mm[i] - model.zero_actuator_mm[i] - altered.scale_mm[i]
             contributions_mm[2 + e, i] = setpoint - setpoint_mm[i]
             setpoint_mm[i] = setpoint
         reason = max(reason, altered.joint_reason[0], result.frame.reason[0], work.with_effects.reason[0])

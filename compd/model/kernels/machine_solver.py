@@ -10,8 +10,6 @@ from typing import Any
 
 from compd.arrays import FloatArray
 from compd.jit import helper
-from compd.model.kernels.forward_solver import solve_forward
-from compd.model.kernels.inverse_solver import solve_inverse
 from compd.model.kernels.octahedron_frame import solve_octahedron
 from compd.rotation import to_inner_frame, to_outer_frame
 
@@ -57,65 +55,6 @@ def set_distances(model: Any, frame_mm: FloatArray, distances_mm: FloatArray) ->
     """The frame's nine distances, equations (6) and (7); frame_mm as in `frame_change_mm`."""
     for i in range(9):
         distances_mm[i] = model.zero_distances_mm[i] + frame_change_mm(frame_mm, i)
-
-
-@helper
-def forward_pose(
-    model: Any,
-    base_joints_M_mm: FloatArray,
-    machine: Any,
-    length_mm: FloatArray,
-    guess_origin_M_mm: FloatArray,
-    guess_rotation_M_P: FloatArray,
-    pose: Any,
-) -> None:
-    """`machine`: that has the platform joints and revolute axes, a model or a machine with effects."""
-    n, k = model.links, model.axes
-    pose.base_joints_M_mm[:, :] = base_joints_M_mm
-    solve_forward(
-        pose.base_joints_M_mm[:n],
-        machine.platform_joints_P_mm[:n],
-        machine.revolute_axes_P[:k],
-        model.hinges[:k],
-        length_mm[:n],
-        guess_origin_M_mm[:],
-        guess_rotation_M_P[:],
-        pose.origin_M_mm,
-        pose.rotation_M_P,
-        pose.link_length_mm[:n],
-        pose.iterations,
-        pose.residual_mm,
-        pose.reason,
-    )
-
-
-@helper
-def inverse_pose(
-    model: Any,
-    base_joints_M_mm: FloatArray,
-    machine: Any,
-    tip_M_mm: FloatArray,
-    tip_P_mm: FloatArray,
-    attitude_M_P: FloatArray,
-    pose: Any,
-) -> None:
-    n, k = model.links, model.axes
-    pose.base_joints_M_mm[:, :] = base_joints_M_mm
-    solve_inverse(
-        pose.base_joints_M_mm[:n],
-        machine.platform_joints_P_mm[:n],
-        machine.revolute_axes_P[:k],
-        model.hinges[:k],
-        tip_M_mm[:],
-        tip_P_mm[:],
-        attitude_M_P[:],
-        pose.origin_M_mm,
-        pose.rotation_M_P,
-        pose.link_length_mm[:n],
-        pose.iterations,
-        pose.residual_mm,
-        pose.reason,
-    )
 
 
 @helper

@@ -83,6 +83,18 @@ class WarmRows(NamedTuple):
     actuator_mm: FloatArray
 
 
+class PoseRows(NamedTuple):
+    """Machines at poses, as in `compd.model.effects.Observations`; with the base's axes rotation_M_B (N, 3, 3)."""
+
+    rotation_M_B: FloatArray
+    base_joints_M_mm: FloatArray
+    origin_M_mm: FloatArray
+    rotation_M_P: FloatArray
+    tip_M_mm: FloatArray
+    scale_mm: FloatArray
+    frame_mm: FloatArray
+
+
 class MemoryArrays(NamedTuple):
     """What effects remember: before the first row and, when a kernel has ended, after the last.
 
@@ -140,6 +152,16 @@ WANTED_ROWS = structure(WantedRows, target_mm=ROWS, attitude_M_P=ROW_MATRICES)
 GIVEN_ROWS = structure(GivenRows, effects_at_mm=ROWS, added_mm=ROW_MATRICES)
 WARM_ROWS = structure(
     WarmRows, supports_M_mm=ROW_MATRICES, origin_M_mm=ROWS, rotation_M_P=ROW_MATRICES, actuator_mm=ROWS
+)
+POSE_ROWS = structure(
+    PoseRows,
+    rotation_M_B=ROW_MATRICES,
+    base_joints_M_mm=ROW_MATRICES,
+    origin_M_mm=ROWS,
+    rotation_M_P=ROW_MATRICES,
+    tip_M_mm=ROWS,
+    scale_mm=ROWS,
+    frame_mm=ROWS,
 )
 MEMORY_ARRAYS = structure(MemoryArrays, motion=NUMBERS, memories=NUMBERS)
 SOLVED_ROWS = structure(SolvedRows, works=WORKSPACES, results=RESULTS)

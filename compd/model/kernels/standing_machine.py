@@ -1,4 +1,4 @@
-"""Machines whose actuators are unknowns of the inverse: on a frame that has moved, and with what effects add.
+"""Forward and inverse of a machine on a frame that has moved, and with what effects add.
 
 What a base carries turns with it: the rails and circles of its actuators, and the axes of its hinges.
 """
@@ -11,23 +11,30 @@ import numpy as np
 
 from compd.arrays import FloatArray
 from compd.jit import helper
-from compd.model.kernels.actuated_links import place_links, solve_actuated_inverse
-from compd.model.kernels.machine_solver import forward_pose
+from compd.model.kernels.actuated_links import EXTENDS, extend, place_links, solve_inverse
+from compd.model.kernels.forward_solver import solve_forward
 from compd.rotation import to_inner_frame, to_outer_frame
 
 
 @helper
 def stand_on(model: Any, rotation_M_B: FloatArray, base_joints_M_mm: FloatArray, machine: Any) -> None:
     """The machine on a base of these axes; base_joints_M_mm (n, 3) with the actuators at 0."""
+    stand_parts(model, rotation_M_B, base_joints_M_mm, machine)
+    machine.reading_to_length_mm[:] = 0.0
+    machine.joint_shortening_mm[:] = 0.0
+
+
+@helper
+def stand_parts(model: Any, rotation_M_B: FloatArray, base_joints_M_mm: FloatArray, machine: Any) -> None:
+    """As `stand_on`, with what is added to the lengths as it was."""
     machine.base_joints_M_mm[:, :] = base_joints_M_mm
     machine.platform_joints_P_mm[:, :] = model.platform_joints_P_mm
     machine.revolute_axes_P[:, :] = model.revolute_axes_P
     machine.tool_mm[:] = model.tool_mm
-    machine.reading_to_length_mm[:] = 0.0
-    machine.joint_shortening_mm[:] = 0.0
     for a in range(model.scales):
-        turn_with_base(model, rotation_M_B, model.cosine_M[a], machine.cosine_M[a])
-        turn_with_base(model, rotation_M_B, model.sine_M[a], machine.sine_M[a])
+        if model.kinds[a] != EXTENDS:
+            turn_with_base(model, rotation_M_B, model.cosine_M[a], machine.cosine_M[a])
+            turn_with_base(model, rotation_M_B, model.sine_M[a], machine.sine_M[a])
     for h in range(model.axes):
         if model.hinges[h, 1] == 1:
             turn_with_base(model, rotation_M_B, model.revolute_axes_P[h], machine.revolute_axes_P[h])
@@ -71,14 +78,27 @@ def forward_standing(
     pose: Any,
 ) -> None:
     """The pose at readings of the scales (m,), with what the machine's joints and effects add to the links."""
-    n = model.links
-    joints_M_mm, length_mm = np.zeros_like(machine.base_joints_M_mm), np.empty(n)
+    n, k = model.links, model.axes
     for a in range(model.scales):
         pose.actuator_mm[a] = model.zero_actuator_mm[a] + scale_mm[a]
-    place_standing(model, machine, pose.actuator_mm, joints_M_mm, length_mm)
+    place_standing(model, machine, pose.actuator_mm, pose.base_joints_M_mm, pose.link_length_mm)
     for i in range(n):
-        length_mm[i] += machine.reading_to_length_mm[i] - machine.joint_shortening_mm[i]
-    forward_pose(model, joints_M_mm, machine, length_mm, guess_origin_M_mm, guess_rotation_M_P, pose)
+        pose.link_length_mm[i] += machine.reading_to_length_mm[i] - machine.joint_shortening_mm[i]
+    solve_forward(
+        pose.base_joints_M_mm[:n],
+        machine.platform_joints_P_mm[:n],
+        machine.revolute_axes_P[:k],
+        model.hinges[:k],
+        pose.link_length_mm[:n],
+        guess_origin_M_mm[:],
+        guess_rotation_M_P[:],
+        pose.origin_M_mm,
+        pose.rotation_M_P,
+        pose.link_length_mm[:n],
+        pose.iterations,
+        pose.residual_mm,
+        pose.reason,
+    )
 
 
 @helper
@@ -88,15 +108,21 @@ def inverse_standing(
     tip_M_mm: FloatArray,
     tip_P_mm: FloatArray,
     attitude_M_P: FloatArray,
-    guess_mm: FloatArray,
+    same_pose: bool,
     pose: Any,
 ) -> None:
-    """The pose and the actuators that bring the tip to its target; guess_mm (m,), where they are about."""
+    """The pose and the actuators that bring the tip to its target; pose.actuator_mm : where they are about.
+
+    same_pose : `pose` reaches this target on a machine that differs in nothing but its links' lengths.
+    """
     n, m, k = model.links, model.scales, model.axes
     rod_length_mm = np.empty(n)
     for i in range(n):
         rod_length_mm[i] = model.rod_length_mm[i] + machine.reading_to_length_mm[i] - machine.joint_shortening_mm[i]
-    solve_actuated_inverse(
+    if same_pose and model.extends_each:
+        extend(model.of_link[:n], rod_length_mm, pose.link_length_mm, pose.actuator_mm)
+        return
+    solve_inverse(
         machine.base_joints_M_mm[:n],
         machine.platform_joints_P_mm[:n],
         machine.revolute_axes_P[:k],
@@ -111,7 +137,7 @@ def inverse_standing(
         tip_M_mm[:],
         tip_P_mm[:],
         attitude_M_P[:],
-        guess_mm[:m],
+        pose.actuator_mm[:m],
         pose.origin_M_mm,
         pose.rotation_M_P,
         pose.actuator_mm[:m],

@@ -15,7 +15,7 @@ from compd.jit import NUMBERS, helper, loop
 from compd.model.kernels.effect_dispatch import set_basis
 from compd.model.kernels.effects_on_machine import set_row
 from compd.model.kernels.joints import shorten_by_joints
-from compd.model.kernels.machine_solver import forward_pose, set_contact, set_distances, solve_frame
+from compd.model.kernels.machine_solver import set_contact, set_distances, solve_frame
 from compd.model.kernels.reason_codes import OK
 from compd.model.kernels.row_arguments import (
     EFFECT_ARRAYS,
@@ -115,19 +115,15 @@ def set_tip_derivatives(
     shorten_by_joints(model.joint_weights[:n, : joint_mm.shape[0]], joint_mm, length_mm, work.altered.joint_reason)
     stand_on(model, frame.rotation_M_B, frame.base_joints_M_mm, standing)
     standing.joint_shortening_mm[:n] = length_mm
-    if model.by_actuators:
-        forward_standing(model, standing, scale_mm, warm.origin_M_mm[0], warm.rotation_M_P[0], pose)
-    else:
-        for i in range(n):
-            length_mm[i] = model.zero_link_length_mm[i] + scale_mm[i] - length_mm[i]
-        forward_pose(model, frame.base_joints_M_mm, model, length_mm, warm.origin_M_mm[0], warm.rotation_M_P[0], pose)
+    forward_standing(model, standing, scale_mm, warm.origin_M_mm[0], warm.rotation_M_P[0], pose)
     if max(frame.reason[0], work.altered.joint_reason[0], pose.reason[0]) != OK:
         return
     set_contact(model, pose, model.tool_mm, result.tip_M_mm, result.tip_P_mm)
     row, tip_M_mm = work.row, result.tip_M_mm
     set_row(model, pose, tip_M_mm, scale_mm, joint_mm, frame_mm, time_s, False, motion, row)
-    by_closure, by_scale, targets = np.empty((3, 6)), np.empty((6, model.scales)), program.targets
-    if not set_tip_by_closure(model, standing, pose, tip_M_mm, by_closure, by_scale):
+    by_closure, by_scale = np.empty((3, 6)), np.empty((6, model.scales))
+    targets = np.append(program.targets, model.scales + model.joints)  # of the frame's distances one for all
+    if not set_tip_by_closure(model, standing, pose, row, tip_M_mm, by_closure, by_scale):
         return
     set_tip_by_ports(
         model,
@@ -137,7 +133,6 @@ def set_tip_derivatives(
         row,
         by_closure,
         by_scale,
-        joint_mm,
         frame_mm,
         targets,
         result.frame,

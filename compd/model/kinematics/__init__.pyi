@@ -1,8 +1,7 @@
 from .actuators import ACTUATOR_KINDS as ACTUATOR_KINDS
 from .actuators import Actuators as Actuators
-from .actuators import inverse_by_actuators as inverse_by_actuators
+from .actuators import inverse_kinematics as inverse_kinematics
 from .actuators import links_at as links_at
-from .actuators import pose_derivatives as pose_derivatives
 from .frame import Frame as Frame
 from .frame import FrameGeometry as FrameGeometry
 from .frame import base_pose as base_pose
@@ -13,7 +12,6 @@ from .link_kinematics import Pose as Pose
 from .link_kinematics import closure_at as closure_at
 from .link_kinematics import forward_kinematics as forward_kinematics
 from .link_kinematics import hinges_on_platform as hinges_on_platform
-from .link_kinematics import inverse_kinematics as inverse_kinematics
 from .motion import Motion as Motion
 from .motion import Movement as Movement
 from .motion import pack_motion as pack_motion

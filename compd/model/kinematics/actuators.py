@@ -1,18 +1,17 @@
 """Machines whose actuators extend links, or move base joints along a line or around a circle.
 
 The links' ends follow from the actuators (`links_at`); from there on `forward_kinematics`, `closure_at` and
-`link_forces` serve every machine. The inverse needs the actuators as unknowns (`inverse_by_actuators`).
+`link_forces` serve every machine. The inverse has the actuators as unknowns.
 """
 
 from __future__ import annotations
 
 from typing import NamedTuple
 
-import numpy as np
 from numpy.typing import ArrayLike
 
 from compd.arrays import FloatArray, IntArray
-from compd.model.kernels import actuated_inverse, placed_links, pose_by_actuators
+from compd.model.kernels import inverse, placed_links
 from compd.model.kinematics.link_kinematics import Mechanism, Pose, check_mechanism
 
 # In the order of their numbers in `compd.model.kernels.actuated_links`.
@@ -61,7 +60,7 @@ def links_at(
     return joints, lengths
 
 
-def inverse_by_actuators(
+def inverse_kinematics(
     mechanism: Mechanism,
     actuators: Actuators,
     tip_M_mm: ArrayLike,
@@ -69,33 +68,18 @@ def inverse_by_actuators(
     rotation_M_P: ArrayLike,
     guess_mm: ArrayLike,
 ) -> ActuatedPose:
-    """Pose and actuators from what the target fixes, by Newton's method in the actuators and the free coordinates.
+    """Pose and actuators from what the target fixes: the second step of equation (8).
+
+    By Newton's method in the actuators and the free coordinates.
 
     mechanism : base joints as in `links_at`.  tip_M_mm, tip_P_mm : (..., 3), the contact in {M} and in {P}.
     rotation_M_P : (..., 3, 3), the attitude wanted. Coordinates that the target leaves free are the guess to start
     from; a free turn about z leaves R(z) rotation_M_P.  guess_mm : (..., m), as machine zero's or the last cycle's.
-    A row fails as `inverse_kinematics` does, and as NEAR_SINGULAR where the target's coordinates do not fix the pose.
+    A row fails as NOT_FINITE; UNREACHABLE (a base joint and its platform joint would coincide); NO_CONVERGENCE;
+    OTHER_ASSEMBLY; NEAR_SINGULAR (the lengths would not hold the pose, or the target's coordinates do not fix it).
+    Raises ValueError for arrays of a wrong shape.
     """
-    origin, rotation, actuator_mm, lengths, joints, iterations, residual, reason = actuated_inverse(
+    origin, rotation, actuator_mm, lengths, joints, iterations, residual, reason = inverse(
         *check_mechanism(mechanism), *actuators, tip_M_mm, tip_P_mm, rotation_M_P, guess_mm
     )
     return ActuatedPose(Pose(origin, rotation, lengths, iterations, residual, reason), actuator_mm, joints)
-
-
-def pose_derivatives(
-    mechanism: Mechanism,
-    actuators: Actuators,
-    actuator_mm: ArrayLike,
-    origin_M_mm: ArrayLike,
-    rotation_M_P: ArrayLike,
-) -> FloatArray:
-    """Derivatives (..., 6, m) of the pose by the actuators; nan where the pose is singular.
-
-    The rows are the displacement of the origin of {P}, mm per mm, and the rotation about {M}'s axes, rad per mm.
-
-    mechanism : base joints where the actuators have moved them, as from `links_at`.
-    """
-    by_actuator, _ = pose_by_actuators(
-        *check_mechanism(mechanism), *actuators[:5], actuator_mm, origin_M_mm, rotation_M_P, np.zeros(6)
-    )
-    return np.asarray(by_actuator)

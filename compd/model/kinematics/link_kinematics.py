@@ -1,6 +1,4 @@
-"""Forward and inverse kinematics of links that end in known base joints.
-
-`compd.model.kinematics.actuators` has the inverse of machines whose actuators move the base joints.
+"""Forward kinematics of links that end in known base joints; `compd.model.kinematics.actuators` has the inverse.
 
 Everything is in {M}, with the base joints where the frame measurement finds them now: the same as working in {B} and
 transforming by equations (8) and (9), one transformation shorter.
@@ -17,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from compd.arrays import FloatArray, IntArray
-from compd.model.kernels import closure, forward, inverse
+from compd.model.kernels import closure, forward
 
 
 class Mechanism(NamedTuple):
@@ -108,20 +106,6 @@ def forward_kinematics(
     Raises ValueError for arrays of a wrong shape.
     """
     return Pose(*forward(*check_mechanism(mechanism), link_length_mm, guess_origin_M_mm, guess_rotation_M_P))
-
-
-def inverse_kinematics(mechanism: Mechanism, tip_M_mm: ArrayLike, tip_P_mm: ArrayLike, rotation_M_P: ArrayLike) -> Pose:
-    """Pose and link lengths from the place of the contact: the second step of equation (8).
-
-    tip_M_mm : (..., 3), the contact in {M}.  tip_P_mm : (..., 3), the same place in {P}.
-    rotation_M_P : (..., 3, 3), for a hexapod the attitude wanted; a tripod's follows from the tip, and this is the
-    guess to start from.
-    A row fails as NOT_FINITE; UNREACHABLE (a base joint and its platform joint would coincide); NO_CONVERGENCE,
-    OTHER_ASSEMBLY (tripod: no attitude, or one turned over, lets the links meet their axes squarely);
-    NEAR_SINGULAR (the lengths exist, but would not hold the pose).
-    Raises ValueError for arrays of a wrong shape.
-    """
-    return Pose(*inverse(*check_mechanism(mechanism), tip_M_mm, tip_P_mm, rotation_M_P))
 
 
 def closure_at(mechanism: Mechanism, origin_M_mm: ArrayLike, rotation_M_P: ArrayLike) -> Closure:

@@ -20,8 +20,8 @@ _VECTOR = (np.float64, 3)
 _MATRIX = (np.float64, (3, 3))
 
 # Of `compd.model.machine.MachineModel`; axes: of its revolute joints. zero_: of machine zero, base joints with the
-# actuators at 0. by_actuators: whether the inverse takes the actuators as its unknowns; what follows are these, of
-# `compd.model.kinematics.actuators.Actuators`.
+# actuators at 0. extends_each: whether each link has an actuator of its own that extends it; what follows are the
+# actuators, of `compd.model.kinematics.actuators.Actuators`.
 MODEL = np.dtype(
     [
         ("links", np.int64),
@@ -42,9 +42,8 @@ MODEL = np.dtype(
         ("tool_mm", *_VECTOR),
         ("joint_weights", np.float64, (MAX_LINKS, MAX_JOINTS)),
         ("zero_base_joints_M_mm", *_POINTS),
-        ("zero_link_length_mm", *_LENGTHS),
         ("zero_distances_mm", np.float64, 9),
-        ("by_actuators", np.int64),
+        ("extends_each", np.int64),
         ("kinds", np.int64, MAX_LINKS),
         ("cosine_M", *_POINTS),
         ("sine_M", *_POINTS),
@@ -111,8 +110,7 @@ SOLVED_POSE = np.dtype(
 )
 
 # The machine between gauges and platform, of `compd.model.prediction.PerturbedMachine`: base joints with the actuators
-# at 0, cosine_M and sine_M where the base has turned them; scale_mm: what is added to the scales' readings. Where the
-# scales read the links' lengths, reading_to_length_mm has that, too.
+# at 0, cosine_M and sine_M where the base has turned them; scale_mm: what is added to the scales' readings.
 SOLVED_MACHINE = np.dtype(
     [
         ("cosine_M", *_POINTS),

@@ -11,11 +11,11 @@ import yaml
 from compd.client import connect
 from compd.machine_builder import build_model
 from compd.machine_kinds import KINDS, machine_text
-from compd.model.kinematics import inverse_kinematics
 from compd.operation_settings import Wiring
 from compd.rotation import rotation_matrix
 from tests.support.external_machines import served
 from tests.support.live_models import file_with
+from tests.support.model_machines import inverse_pose
 from tests.support.running_daemon import supervised
 from tests.system.processes.test_own_kinematics import PATIENCE_S, first, is_ok, take_zero
 
@@ -70,8 +70,9 @@ def test_a_commanded_pose_is_corrected_by_temperatures(tmp_path: Path) -> None:
     mechanism = model.mechanism(model.zero.base_joints_M_mm)
     tool = model.zero.contact.tip_P_mm
     R = rotation_matrix(turn_rad)
-    asked = inverse_kinematics(mechanism, tip_mm, tool, R).link_length_mm
-    told = inverse_kinematics(
+    asked = inverse_pose(model, mechanism, tip_mm, tool, R).link_length_mm
+    told = inverse_pose(
+        model,
         mechanism,
         tip_mm + warm["tip_correction_mm"],
         tool,

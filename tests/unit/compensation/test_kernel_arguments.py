@@ -13,10 +13,10 @@ import pytest
 from compd.compensation import compensation
 from compd.compensation.compensation import compensate_cmm, compensate_machine_tool
 from compd.compensation.values import GaugeValues, WarmStart
-from compd.model import MachineModel, machine_constants
+from compd.model import MachineModel, machine_constants, sensitivity
 from compd.model import tip_derivative as derivatives
 from compd.model.effects import Effect, FittedEffect, evaluate_basis
-from tests.support.effect_rows import DETAILS, HEXAPOD, LIBRARY, TRIPOD, constants_of
+from tests.support.effect_rows import DETAILS, HEXAPOD, LIBRARY, TRIPOD, constants_of, observe_rows, random_inputs
 
 
 def in_python(effect: Effect) -> Effect:
@@ -97,3 +97,17 @@ def test_the_derivatives_give_their_kernel_what_it_is_compiled_for(
     )
     (arguments,) = calls
     assert tuple(map(numba.typeof, arguments)) == kernel.signature
+
+
+@pytest.mark.parametrize("model", [TRIPOD, HEXAPOD], ids=["tripod", "hexapod"])
+def test_the_sensitivities_give_their_kernel_what_it_is_compiled_for(
+    monkeypatch: pytest.MonkeyPatch, model: MachineModel
+) -> None:
+    calls: list[tuple[Any, ...]] = []
+    kernel: Any = sensitivity.set_sensitivities
+    monkeypatch.setattr(sensitivity, "set_sensitivities", spy(calls, kernel))
+    sensitivity.sensitivities(model, observe_rows(model, random_inputs(model)), ["scale", "reference", "plate"])
+    sensitivity.sensitivities(model, observe_rows(model, random_inputs(model)), ["reference"])
+    assert len(calls) == 2
+    for arguments in calls:
+        assert tuple(map(numba.typeof, arguments)) == kernel.signature

@@ -8,12 +8,12 @@ import pytest
 from compd.configuration import load
 from compd.live.loop import Target
 from compd.live.machine import Models
-from compd.model.kinematics import inverse_kinematics
 from compd.rotation import rotation_matrix
 from compd.setpoint_states import State
 from tests.support.bare_machines import bare_machine
 from tests.support.live_machine import Machine
 from tests.support.live_models import file_with
+from tests.support.model_machines import inverse_pose
 from tests.unit.live.test_daemon import configuration, first, running
 
 TIPS_B0_mm = {"6-ups": (20.0, -10.0, 500.0), "3-spr": (10.0, 5.0, 520.0), "linear-delta": (15.0, 0.0, -340.0)}
@@ -36,7 +36,7 @@ def lengthened(kind, tmp_path):
 def drawn_lengths_mm(model, tip_mm, rotation_M_P):
     """(n,) mm: by the drawing, with the tip there."""
     mechanism = model.mechanism(model.zero.base_joints_M_mm)
-    return inverse_kinematics(mechanism, tip_mm, model.zero.contact.tip_P_mm, rotation_M_P).link_length_mm
+    return inverse_pose(model, mechanism, tip_mm, model.zero.contact.tip_P_mm, rotation_M_P).link_length_mm
 
 
 @pytest.mark.parametrize("kind", ["6-ups", "3-spr"])

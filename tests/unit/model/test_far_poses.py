@@ -18,7 +18,7 @@ from compd.machine_builder import build_model
 from compd.machine_kinds import KINDS, machine_text
 from compd.machine_reach import amplification, amplifications, machine_reach
 from compd.model import MachineModel
-from compd.model.kinematics import Mechanism, inverse_by_actuators
+from compd.model.kinematics import Mechanism, inverse_kinematics
 from compd.rotation import compose, rotation_matrix
 from tests.support.model_machines import Floats
 
@@ -71,7 +71,7 @@ def walked(model: MachineModel, turned: bool) -> Walked:
         if fixed[3:].any():
             attitude = compose(rotation_matrix(share * change[:, 3:]), zero.rotation_M_P)
         tip_M_mm = zero.contact.tip_M_mm + share * change[:, :3]
-        found = inverse_by_actuators(mechanism, model.actuators, tip_M_mm, zero.contact.tip_P_mm, attitude, actuator_mm)
+        found = inverse_kinematics(mechanism, model.actuators, tip_M_mm, zero.contact.tip_P_mm, attitude, actuator_mm)
         pose, at = found.pose, mechanism._replace(base_joints_M_mm=found.base_joints_M_mm)
         good &= (pose.reason == 0) & (amplifications(at, pose.origin_M_mm, pose.rotation_M_P) <= most)
         # a step beyond three times what the tip moves: the rod is square to its rail, and has another side

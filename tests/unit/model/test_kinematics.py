@@ -10,13 +10,14 @@ from scipy.optimize import fsolve
 
 from compd.model.kernels.solve_status import AMPLIFICATION_LIMIT, Reason, require
 from compd.model.kinematics.frame import solve_frame
-from compd.model.kinematics.link_kinematics import Mechanism, Pose, closure_at, forward_kinematics, inverse_kinematics
+from compd.model.kinematics.link_kinematics import Mechanism, Pose, closure_at, forward_kinematics
 from compd.model.machine import MachineModel, MachineParts, machine_model
 from compd.rotation import rotation_matrix, rotation_vector
 from tests.support.model_machines import (
     Floats,
     hexapod,
     hexapod_parts,
+    inverse_pose,
     move_machine,
     rotation,
     tips,
@@ -40,7 +41,7 @@ def forward(model: MachineModel, lengths: Floats, mechanism: Mechanism | None = 
 
 def inverse(model: MachineModel, tip_M_mm: Floats, attitude: Floats | None = None) -> Pose:
     attitude = model.zero.rotation_M_P if attitude is None else attitude
-    return inverse_kinematics(at_zero(model), tip_M_mm, model.zero.contact.tip_P_mm, attitude)
+    return inverse_pose(model, at_zero(model), tip_M_mm, model.zero.contact.tip_P_mm, attitude)
 
 
 def link_vectors(mechanism: Mechanism, pose: Pose) -> Floats:
@@ -104,11 +105,11 @@ def test_rows_alone_are_as_all_together(model: MachineModel) -> None:
     tip = tips(model, 30, 2)
     bases = model.zero.base_joints_M_mm + np.random.default_rng(3).normal(0, 0.1, (30, model.links, 3))
     tool, zero = model.zero.contact.tip_P_mm, model.zero
-    there = inverse_kinematics(model.mechanism(bases), tip, tool, zero.rotation_M_P)
+    there = inverse_pose(model, model.mechanism(bases), tip, tool, zero.rotation_M_P)
     back = forward(model, there.link_length_mm, model.mechanism(bases))
     require(np.maximum(there.reason, back.reason), "pose")
     for i in range(30):
-        one = inverse_kinematics(model.mechanism(bases[i]), tip[i], tool, zero.rotation_M_P)
+        one = inverse_pose(model, model.mechanism(bases[i]), tip[i], tool, zero.rotation_M_P)
         assert all(a.tobytes() == b[i].tobytes() for a, b in zip(one, there, strict=True))
         one = forward(model, there.link_length_mm[i], model.mechanism(bases[i]))
         assert all(a.tobytes() == b[i].tobytes() for a, b in zip(one, back, strict=True))

@@ -18,7 +18,6 @@ from compd.model.effects.effect import PORTS, FittedEffect, Port
 from compd.model.effects.effect_basis import evaluate_basis, port_size
 from compd.model.effects.observations import Observations
 from compd.model.kernels.solve_status import Reason
-from compd.model.kinematics import inverse_kinematics
 from compd.model.kinematics.motion import Movement
 from compd.model.kinematics.tool import ToolOnPlate
 from compd.model.machine import MachineModel
@@ -27,7 +26,7 @@ from compd.model.sensitivity import link_residuals, sensitivities
 from compd.rotation import compose, rotation_vector
 from tests.support.effect_derivatives import effect_sensitivity
 from tests.support.effect_rows import HEXAPOD, LIBRARY, TRIPOD, constants_of, observe_rows, random_inputs
-from tests.support.model_machines import Floats
+from tests.support.model_machines import Floats, inverse_pose
 from tests.support.paths import SHARED
 
 RECORDINGS = SHARED / "recordings"
@@ -139,7 +138,7 @@ def test_the_altered_machine_leads_back_to_its_scales(name: str) -> None:
     no_scale_mm = np.zeros_like(rows.scale_mm)
     machine = perturb_machine(model, no_scale_mm, rows.joint_mm, rows.frame_mm, found)
     places = (machine.tool_mm, shown.tip_mm) if name == "tool on plate" else (shown.tip_mm, machine.tool_mm)
-    pose = inverse_kinematics(machine.mechanism, *places, shown.rotation_M_P)
+    pose = inverse_pose(model, machine.mechanism, *places, shown.rotation_M_P)
     np.testing.assert_allclose(pose.link_length_mm - machine.length_mm, rows.scale_mm, atol=1e-9)
     assert np.abs(shown.tip_mm - predict(model, rows, {}).tip_mm).max() > 1e-3
 

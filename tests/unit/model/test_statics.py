@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from compd.model.kernels.solve_status import Reason, require
-from compd.model.kinematics.link_kinematics import forward_kinematics, inverse_kinematics
+from compd.model.kinematics.link_kinematics import forward_kinematics
 from compd.model.kinematics.statics import link_forces
 from compd.model.machine import MachineModel
-from tests.support.model_machines import hexapod, rotation, tips, tripod
+from tests.support.model_machines import hexapod, inverse_pose, rotation, tips, tripod
 
 TRIPOD, HEXAPOD = tripod(), hexapod()
 
@@ -22,7 +22,7 @@ def test_work_of_the_load_is_work_of_the_links(model: MachineModel) -> None:
     tool, weight_N, weight_at_P = model.zero.contact.tip_P_mm, 80.0, np.array([5.0, -3.0, 20.0])
     h = 1e-3
     for tip in tips(model, 8, 2):
-        pose = inverse_kinematics(mechanism, tip, tool, model.zero.rotation_M_P)
+        pose = inverse_pose(model, mechanism, tip, tool, model.zero.rotation_M_P)
         force = rng.normal(0, 50, 3)
         forces = link_forces(mechanism, pose.origin_M_mm, pose.rotation_M_P, force, tip, weight_N, weight_at_P)
         require(forces.reason, "forces")
@@ -39,7 +39,7 @@ def test_work_of_the_load_is_work_of_the_links(model: MachineModel) -> None:
 def test_forces_and_moments_add_up_to_nothing(model: MachineModel) -> None:
     mechanism = model.mechanism(model.zero.base_joints_M_mm)
     tip, force = tips(model, 1, 3)[0], np.array([10.0, -20.0, 30.0])
-    pose = inverse_kinematics(mechanism, tip, model.zero.contact.tip_P_mm, model.zero.rotation_M_P)
+    pose = inverse_pose(model, mechanism, tip, model.zero.contact.tip_P_mm, model.zero.rotation_M_P)
     forces = link_forces(mechanism, pose.origin_M_mm, pose.rotation_M_P, force, tip, 80.0, np.zeros(3))
     joints = pose.origin_M_mm + mechanism.platform_joints_P_mm @ pose.rotation_M_P.T
     along = (joints - mechanism.base_joints_M_mm) / pose.link_length_mm[:, None]
@@ -72,7 +72,7 @@ def test_a_hanging_platform_pulls_its_links_alike() -> None:
 def test_rows_alone_are_as_all_together(model: MachineModel) -> None:
     mechanism = model.mechanism(model.zero.base_joints_M_mm)
     tip = tips(model, 20, 4)
-    pose = inverse_kinematics(mechanism, tip, model.zero.contact.tip_P_mm, model.zero.rotation_M_P)
+    pose = inverse_pose(model, mechanism, tip, model.zero.contact.tip_P_mm, model.zero.rotation_M_P)
     force = np.random.default_rng(5).normal(0, 50, (20, 3))
     rest = (80.0, np.zeros(3))
     together = link_forces(mechanism, pose.origin_M_mm, pose.rotation_M_P, force, tip, *rest)

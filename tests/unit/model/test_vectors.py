@@ -9,11 +9,11 @@ import pytest
 
 from compd.compensation import GaugeValues, WarmStart, compensate_cmm, compensate_machine_tool
 from compd.model.kinematics.frame import solve_frame
-from compd.model.kinematics.link_kinematics import forward_kinematics, inverse_kinematics
+from compd.model.kinematics.link_kinematics import forward_kinematics
 from compd.model.kinematics.statics import link_forces
 from compd.model.kinematics.tool import Contact, ToolOnPlatform
 from compd.model.machine import MachineModel, MachineParts, machine_model
-from tests.support.model_machines import TRIPOD_WEIGHTS, Floats, column, extending, worked_cases
+from tests.support.model_machines import TRIPOD_WEIGHTS, Floats, column, extending, inverse_pose, worked_cases
 
 LENGTH_MM = 1e-9
 ANGLE_RAD = 1e-12
@@ -104,7 +104,7 @@ def test_tripod_inverse_and_forward(tripod: MachineModel, tripod_cases: dict[str
     cases = tripod_cases["kinematics"]
     mechanism = tripod.mechanism(tripod.zero.base_joints_M_mm)
     tool, zero = tripod.zero.contact.tip_P_mm, tripod.zero
-    inverse = inverse_kinematics(mechanism, column(cases, "tip_M"), tool, zero.rotation_M_P)
+    inverse = inverse_pose(tripod, mechanism, column(cases, "tip_M"), tool, zero.rotation_M_P)
     lengths = column(cases, "lengths")
     forward = forward_kinematics(mechanism, lengths, zero.platform_origin_M_mm, zero.rotation_M_P)
     for pose in (inverse, forward):
@@ -140,7 +140,7 @@ def test_statics(tripod: MachineModel, tripod_cases: dict[str, Any]) -> None:
     cases = tripod_cases["statics"]
     mechanism = tripod.mechanism(tripod.zero.base_joints_M_mm)
     tip_M_mm = column(cases, "tip_M")
-    pose = inverse_kinematics(mechanism, tip_M_mm, tripod.zero.contact.tip_P_mm, tripod.zero.rotation_M_P)
+    pose = inverse_pose(tripod, mechanism, tip_M_mm, tripod.zero.contact.tip_P_mm, tripod.zero.rotation_M_P)
     forces = link_forces(
         mechanism,
         pose.origin_M_mm,
