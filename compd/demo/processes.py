@@ -67,7 +67,7 @@ def simulated_daemon(
     """Both run during the block; the directory with their sockets, `control.sock` and `compd.sock`.
 
     seed : of weather, joints and targets.  speedup : of the weather.  zero_hold_s : how long the machine stands at
-    machine zero, s.  effects : hidden in the machine, as for `compd simulate --effect`.
+    machine zero, s.  effects : hidden in the machine, as for `compd sim run --effect`.
 
     Raises DaemonError if one does not start.
     """

@@ -77,7 +77,7 @@ def run_demonstration(
     configuration : of the shipped hexapod.
     out : existing directory for recording and model file.
     seed : of weather and joints.
-    effects : hidden in the machine, as for `compd simulate --effect`.
+    effects : hidden in the machine, as for `compd sim run --effect`.
     tell : called with what happens.
     program : G-code, to be run at the machine's zero, which it comes back to.
     speedup : factor by which weather and warm-up run faster than the machine moves.
@@ -220,7 +220,7 @@ def diagnose(recording: Path, machine: Path) -> tuple[str, list[str]]:
 
 
 def add_effects(effects: Sequence[str], recording: Path, machine: Path, model: Path) -> None:
-    """`compd effect add`, for one effect after the other, into a new model file."""
+    """`compd model add`, for one effect after the other, into a new model file."""
     model.unlink(missing_ok=True)
     for effect in effects:
         _compd("effect", "add", effect, "--recording", str(recording), "--machine", str(machine), "--model", str(model))
