@@ -29,17 +29,11 @@ _HALF_DAY = frozenset(("AM", "PM"))
 
 @dataclass
 class Roles:
-    """What the columns are.
+    """What the columns are."""
 
-    Attributes
-    ----------
-    column : role -> index of the column. unit : role -> its unit, as its name or a person says; "" for none.
-    why : role -> how it is known, in words.
-    """
-
-    column: dict[str, int] = field(default_factory=dict)
-    unit: dict[str, str] = field(default_factory=dict)
-    why: dict[str, str] = field(default_factory=dict)
+    column: dict[str, int] = field(default_factory=dict)  #: role -> index of the column
+    unit: dict[str, str] = field(default_factory=dict)  #: role -> its unit, as its name or a person says; "" for none
+    why: dict[str, str] = field(default_factory=dict)  #: role -> how it is known, in words
 
     def take(self, role: str, column: int, unit: str, why: str) -> None:
         """Note that `column` has a role."""

@@ -24,30 +24,20 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class WrittenForm:
-    """One form in which the simulated instrument writes a format: a name of `compd sim tracker --as`.
+    """One form in which the simulated instrument writes a format: a name of `compd sim tracker --as`."""
 
-    Attributes
-    ----------
-    name : of the form. title : of what is written, for messages: "delimited text".
-    summary : what sets this form apart, for the help: "commas, decimal point, ISO date stamps".
-    write_bytes : the bytes of the file; called with samples that the form can hold.
-    axes : sets of axes that the form holds.
-    holds_points : whether it holds points without a time.
-    constant_rate : whether rows stand at equal distances in time, because they have no time of their own.
-    says_rate, says_unit : whether the file states the times or the rate of its rows, and the unit of its lengths.
-    resolution_mm : step between two lengths that can be written, mm.
-    """
-
-    name: str
-    title: str
-    summary: str
-    write_bytes: Callable[[Samples], bytes]
-    axes: tuple[tuple[str, ...], ...] = (LENGTH_AXES, POSITION_AXES, POSE_AXES)
-    holds_points: bool = True
+    name: str  #: of the form
+    title: str  #: of what is written, for messages: "delimited text"
+    summary: str  #: what sets this form apart, for the help: "commas, decimal point, ISO date stamps"
+    write_bytes: Callable[[Samples], bytes]  #: the bytes of the file; called with samples that the form can hold
+    axes: tuple[tuple[str, ...], ...] = (LENGTH_AXES, POSITION_AXES, POSE_AXES)  #: sets of axes that the form holds
+    holds_points: bool = True  #: whether it holds points without a time
+    #: whether rows stand at equal distances in time, because they have no time of their own
     constant_rate: bool = False
+    #: says_rate, says_unit: whether the file states the times or the rate of its rows, and the unit of its lengths
     says_rate: bool = True
     says_unit: bool = True
-    resolution_mm: float = 1e-6
+    resolution_mm: float = 1e-6  #: step between two lengths that can be written, mm
 
     def write(self, samples: Samples) -> bytes:
         """The bytes of the file. Raises CompdError for samples that the form cannot hold."""
@@ -57,37 +47,23 @@ class WrittenForm:
 
 @dataclass(frozen=True, kw_only=True)
 class InstrumentFormat:
-    """A format of exports: a name of `compd recording join --as`.
+    """A format of exports: a name of `compd recording join --as`."""
 
-    Attributes
-    ----------
-    name : of the format. title : short, for the page: "SpatialAnalyzer".
-    file_is : what such a file is and which instrument or program writes it, in Markdown.
-    finds : what is found in such a file, in Markdown.
-    ending : usual ending of the file's name. Files are recognised by their content alone.
-    written : forms in which the simulated instrument writes it.
-    """
-
-    name: str
-    title: str
-    file_is: str
-    finds: str
-    ending: str
-    written: tuple[WrittenForm, ...] = ()
+    name: str  #: of the format
+    title: str  #: short, for the page: "SpatialAnalyzer"
+    file_is: str  #: what such a file is and which instrument or program writes it, in Markdown
+    finds: str  #: what is found in such a file, in Markdown
+    ending: str  #: usual ending of the file's name. Files are recognised by their content alone.
+    written: tuple[WrittenForm, ...] = ()  #: forms in which the simulated instrument writes it
 
 
 @dataclass(frozen=True, kw_only=True)
 class TextFormat(InstrumentFormat):
-    """A format of text.
+    """A format of text."""
 
-    Attributes
-    ----------
-    read : the table in a text. Raises RecordingError.
-    mark : regular expression of a line among the first of the file by which the format is recognised, case ignored;
-        "" for a format that is read where no other is recognised.
-    """
-
-    read: Callable[[TextFile, ReadOptions], RawTable]
+    read: Callable[[TextFile, ReadOptions], RawTable]  #: the table in a text. Raises RecordingError.
+    #: regular expression of a line among the first of the file by which the format is recognised, case ignored; "" for
+    #: a format that is read where no other is recognised
     mark: str = ""
 
 
@@ -100,17 +76,12 @@ class OutdatedFile(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True)
 class BinaryFormat(InstrumentFormat):
-    """A format of bytes.
+    """A format of bytes."""
 
-    Attributes
-    ----------
-    read : the table in a file, or the whole export where it has no columns of text. Raises RecordingError.
-    magic : first bytes of every such file.
-    outdated : first bytes of older files, which are refused.
-    sheet_names : names of the sheets in a file; None for a format without sheets. Raises RecordingError.
-    """
-
+    #: the table in a file, or the whole export where it has no columns of text. Raises RecordingError.
     read: Callable[[Path, ReadOptions], RawTable | InstrumentExport]
-    magic: bytes
+    magic: bytes  #: first bytes of every such file
+    #: first bytes of older files, which are refused
     outdated: Mapping[bytes, OutdatedFile] = field(default_factory=dict)
+    #: names of the sheets in a file; None for a format without sheets. Raises RecordingError.
     sheet_names: Callable[[Path, ReadLimits], tuple[str, ...]] | None = None

@@ -28,26 +28,16 @@ _MAX_GROUPS = 200
 
 @dataclass(frozen=True)
 class ExportPreview:
-    """The top of an export.
+    """The top of an export."""
 
-    Attributes
-    ----------
-    export : the whole of it; None where `problems` say why it cannot be read.
-    shape : name of its format; "" where it is not known.
-    line : of each row that is shown. rows : their cells, one text in each where no columns could be told.
-    header : (C,) names of the columns; empty where they have none. roles : (C,) what each is taken for, "-" for
-        nothing; empty where no columns could be told.
-    assumed : what was found, in words. groups, sheets : that there are to choose from.
-    """
-
-    export: InstrumentExport | None
-    shape: str = ""
-    line: Sequence[int] = ()
-    rows: Sequence[Sequence[str]] = ()
-    header: Sequence[str] = ()
-    roles: Sequence[str] = ()
-    assumed: Mapping[str, str] = field(default_factory=dict)
-    groups: Sequence[str] = ()
+    export: InstrumentExport | None  #: the whole of it; None where `problems` say why it cannot be read
+    shape: str = ""  #: name of its format; "" where it is not known
+    line: Sequence[int] = ()  #: of each row that is shown
+    rows: Sequence[Sequence[str]] = ()  #: their cells, one text in each where no columns could be told
+    header: Sequence[str] = ()  #: (C,) names of the columns; empty where they have none
+    roles: Sequence[str] = ()  #: (C,) what each is taken for, "-" for nothing; empty where no columns could be told
+    assumed: Mapping[str, str] = field(default_factory=dict)  #: what was found, in words
+    groups: Sequence[str] = ()  #: groups, sheets: that there are to choose from
     sheets: Sequence[str] = ()
     problems: Sequence[Problem] = ()
 

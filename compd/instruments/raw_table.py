@@ -11,29 +11,19 @@ from compd.arrays import IntArray
 
 @dataclass(frozen=True)
 class RawTable:
-    """The cells of an export, column by column.
+    """The cells of an export, column by column."""
 
-    Attributes
-    ----------
-    path : the file. shape : name of its format.
-    columns : (C) columns of (N,) cells each, stripped, "" where empty. A number has "." as its decimal mark already.
-    line : (N,) line of the file, or row of the sheet, from 1.
-    header : (C,) names of the columns; None if the file has none. header_line : its line; 0 without one.
-    unit : of the lengths, where the file says it beside the columns' names ("mm", "m", "inch" ...); "" if not.
-    decimal : "." or ",", as it was in the file.
-    assumed : in words for a person, what was found: "delimiter" -> "semicolon", "decimal mark" -> "comma", ...
-    roles : roles that the shape itself settles, by column; empty for any other column.
-    left_out : reason -> rows that are not there.
-    """
-
-    path: Path
-    shape: str
+    path: Path  #: the file
+    shape: str  #: name of its format
+    #: (C) columns of (N,) cells each, stripped, "" where empty. A number has "." as its decimal mark already.
     columns: Sequence[Sequence[str]]
-    line: IntArray
-    header: tuple[str, ...] | None = None
-    header_line: int = 0
+    line: IntArray  #: (N,) line of the file, or row of the sheet, from 1
+    header: tuple[str, ...] | None = None  #: (C,) names of the columns; None if the file has none
+    header_line: int = 0  #: its line; 0 without one
+    #: of the lengths, where the file says it beside the columns' names ("mm", "m", "inch" ...); "" if not.
     unit: str = ""
-    decimal: str = "."
+    decimal: str = "."  #: "." or ",", as it was in the file.
+    #: in words for a person, what was found: "delimiter" -> "semicolon", "decimal mark" -> "comma", ...
     assumed: Mapping[str, str] = field(default_factory=dict)
-    roles: Sequence[str] = ()
-    left_out: Mapping[str, int] = field(default_factory=dict)
+    roles: Sequence[str] = ()  #: roles that the shape itself settles, by column; empty for any other column
+    left_out: Mapping[str, int] = field(default_factory=dict)  #: reason -> rows that are not there

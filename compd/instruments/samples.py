@@ -18,26 +18,16 @@ LENGTH, POSITION, POSE = LENGTH_AXES, POSITION_AXES, POSE_AXES
 
 @dataclass(frozen=True)
 class Samples:
-    """N samples or points.
+    """N samples or points."""
 
-    Attributes
-    ----------
-    axes : names of the columns of `values`, as in `InstrumentExport`.
-    values : (N, d) mm, attitude in rad.
-    time_s : (N,) on the instrument's clock; None for points without a time.
-    names : (N,) of the points; None if they have none.
-    unit : in which lengths are to be written.
-    start : calendar time at which `time_s` is 0; needed by shapes that stamp their rows with a date.
-    group : of the points, for shapes that have groups.
-    """
-
-    axes: Sequence[str]
-    values: FloatArray
-    time_s: FloatArray | None = None
-    names: Sequence[str] | None = None
-    unit: str = "mm"
+    axes: Sequence[str]  #: names of the columns of `values`, as in `InstrumentExport`
+    values: FloatArray  #: (N, d) mm, attitude in rad
+    time_s: FloatArray | None = None  #: (N,) on the instrument's clock; None for points without a time
+    names: Sequence[str] | None = None  #: (N,) of the points; None if they have none
+    unit: str = "mm"  #: in which lengths are to be written
+    #: calendar time at which `time_s` is 0; needed by shapes that stamp their rows with a date
     start: datetime | None = None
-    group: str = "Points"
+    group: str = "Points"  #: of the points, for shapes that have groups
 
     @property
     def written_values(self) -> FloatArray:

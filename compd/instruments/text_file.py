@@ -20,18 +20,12 @@ _UTF8_MARK, _UTF16_MARKS = b"\xef\xbb\xbf", (b"\xff\xfe", b"\xfe\xff")
 
 @dataclass(frozen=True)
 class TextFile:
-    """The lines of a text file.
+    """The lines of a text file."""
 
-    Attributes
-    ----------
-    path : the file. lines : without their ends; the first is line 1 for a person.
-    encoding : in words. complete : whether the last line has an end.
-    """
-
-    path: Path
-    lines: list[str]
-    encoding: str
-    complete: bool
+    path: Path  #: the file
+    lines: list[str]  #: without their ends; the first is line 1 for a person
+    encoding: str  #: in words
+    complete: bool  #: whether the last line has an end
 
 
 def read_content(path: Path) -> bytes:

@@ -37,17 +37,11 @@ DateKey = tuple[str, str, str, str]
 
 @dataclass(frozen=True)
 class StampedTime:
-    """Times in seconds.
+    """Times in seconds."""
 
-    Attributes
-    ----------
-    time_s : (N,); nan where a cell is empty. std_s : standard uncertainty of one, for its coarse resolution.
-    assumed : in words, what was found.
-    """
-
-    time_s: FloatArray
-    std_s: float
-    assumed: str
+    time_s: FloatArray  #: (N,); nan where a cell is empty
+    std_s: float  #: standard uncertainty of one, for its coarse resolution
+    assumed: str  #: in words, what was found
 
 
 def is_stamp(cell: str) -> bool:

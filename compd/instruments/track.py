@@ -29,25 +29,16 @@ _SHARE_MIXED = 0.15
 
 @dataclass(frozen=True)
 class Track:
-    """The positions or lengths that an instrument measured, sample by sample.
+    """The positions or lengths that an instrument measured, sample by sample."""
 
-    Attributes
-    ----------
-    path : the export. time_s : (M,) on the instrument's clock, strictly rising.
-    position_mm : (M, d) on `axes`: a subset of "x", "y", "z", or "length" alone.
-    rotation_rad : (M, 3) attitude, a rotation vector; None if none was measured.
-    time_std_s : standard uncertainty of one time, beside that of the clock's offset.
-    taken : what was taken for what, for a person. left_out : reason -> rows of the export that are not there.
-    """
-
-    path: Path
-    time_s: FloatArray
-    position_mm: FloatArray
+    path: Path  #: the export
+    time_s: FloatArray  #: (M,) on the instrument's clock, strictly rising
+    position_mm: FloatArray  #: (M, d) on `axes`: a subset of "x", "y", "z", or "length" alone
     axes: tuple[str, ...]
-    taken: Mapping[str, str] = field(default_factory=dict)
-    left_out: Mapping[str, int] = field(default_factory=dict)
-    rotation_rad: FloatArray | None = None
-    time_std_s: float = 0.0
+    taken: Mapping[str, str] = field(default_factory=dict)  #: what was taken for what, for a person
+    left_out: Mapping[str, int] = field(default_factory=dict)  #: reason -> rows of the export that are not there
+    rotation_rad: FloatArray | None = None  #: (M, 3) attitude, a rotation vector; None if none was measured
+    time_std_s: float = 0.0  #: standard uncertainty of one time, beside that of the clock's offset
 
     @property
     def period_s(self) -> float:

@@ -35,30 +35,18 @@ _IN_REFERENCE_UNIT = re.compile(r"(?:reference|model)_(?:[xyz]|link_[1-9]\d*)")
 
 @dataclass(frozen=True)
 class Layout:
-    """The columns of a recording.
+    """The columns of a recording."""
 
-    Attributes
-    ----------
-    scales, joints : how many columns; 0 = none, or an external model.
-    frame : how many frame comparators: nine, the six of u1 to u6, or none.
-    approach : whether there is an approach column for every scale; of an external model, any.
-    axes, attitude : of the reference's position; whether it has an attitude.
-    links : the links (1-based) whose length the reference measures.
-    covariates : names of all other columns.
-    commanded : names of the columns of the commanded pose, of a machine without scales.
-    ending : what the names of reference and model end in: "mm", or another unit that the sidecar names.
-    """
-
-    scales: int
+    scales: int  #: scales, joints: how many columns; 0 = none, or an external model
     joints: int
-    frame: int
-    approach: bool
-    axes: tuple[str, ...]
+    frame: int  #: how many frame comparators: nine, the six of u1 to u6, or none
+    approach: bool  #: whether there is an approach column for every scale; of an external model, any
+    axes: tuple[str, ...]  #: axes, attitude: of the reference's position; whether it has an attitude
     attitude: bool
-    links: tuple[int, ...]
-    covariates: tuple[str, ...]
-    ending: str = "mm"
-    commanded: tuple[str, ...] = ()
+    links: tuple[int, ...]  #: the links (1-based) whose length the reference measures
+    covariates: tuple[str, ...]  #: names of all other columns
+    ending: str = "mm"  #: what the names of reference and model end in: "mm", or another unit that the sidecar names
+    commanded: tuple[str, ...] = ()  #: names of the columns of the commanded pose, of a machine without scales
 
     @property
     def reference(self) -> tuple[str, ...]:

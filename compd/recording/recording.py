@@ -60,84 +60,68 @@ class Recording:
     """N rows of one recording. Lengths are mm (the file's um are converted), nan where a cell was empty.
 
     Where the reference is in another `unit`, such as arcsec, one of it counts as a um (1e-3 mm) in the attributes.
-
-    Attributes
-    ----------
-    path, sha256 : the table's file; hash of it, its sidecar and its ball plate, for provenance.
-    sidecar : what the sidecar says; `machine` and `reference` are short for its own.
-    row : (N,) row as a spreadsheet shows it, the header being row 1.
-    time_s : (N,) s on the file's clock, strictly rising, never nan; without `has_time` the number of the row.
-    begin_s : the file's first time, of a block or of chosen rows too; effects and descriptions count from it.
-    has_time : whether the file has the time of each row; an external model's rows may be in order without it.
-    session, visit, point : (N,) int or None if the column is absent; -1 where the cell is empty.
-        Text ids are numbered in sorted order; `labels` has the texts.
-    scale_mm : (N, n) or None: gL_i, zero at machine zero. joint_mm : (N, k) or None. frame_mm : (N, 9) or
-        None, in the order t1..t3, u1..u6. None only where the format allows them to be missing.
-    commanded_mm, commanded_rotation_rad : (N, 3) or None: the pose that the controller of a machine without scales was
-        told; nan along an axis that has no column.
-    approach : (N, n) or None: +1/-1, the direction in which link i last moved; from the columns, else from
-        the scales (`compd.travel_direction`); nan where it is not known.
-        With `machine: external` None; gauges and directions are quantities then.
-    approach_measured : whether there are `approach` columns.
-    quantities : full column name with unit -> (N,), in the column's unit: everything that is not named here.
-    reference_mm : (N, axes) or None: the tip on `reference_axes` (a subset of "x", "y", "z", in this order); for a
-        ball plate the calibrated place of the row's ball, all three axes.
-    reference_rotation_rad : (N, 3) or None: rotation vector of {P} in {M}.
-    reference_link_mm : (N, m) or None: change of the links `reference_links` (1-based numbers).
-    reference_distance_mm : (N,) or None: from the tip to the fixed end that `ball` names, or to the only one.
-    ball : (N,) int or None, -1 where empty; text names of fixed ends are numbered in sorted order. plate : the ball
-        plate.
-    pin : (N,) int or None: the fixed pin in which the tip was; -1 where empty, text numbered in sorted order.
-    labels : column of ids -> its texts, by number; columns whose ids are numbers are not among them.
-    model_mm, model_rotation_rad, model_link_mm : with `machine: external` the user's own model's prediction, column
-        for column as the reference's.
-    excluded : (N,) bool, by the person; the reasons are in `sidecar.excluded`.
-    left_out : reason -> rows of the file that are no row here (no time; empty row between others).
-    columns : name -> (N,) every column as in the file, in the file's unit.
-    warnings : what can be used but should be looked at.
-    target_P_mm : (N, 3) or None: where the row's reflector is, from the tip along the axes of {P}; nan where the cell
-        is empty; None where the tip itself was measured.
-    sample : where these rows were drawn from a longer recording, what is known of all of it; else None.
-    faults : data that are wrong or look so. Cells that these take as empty are so in `quantities`, not in `columns`.
     """
 
-    path: Path
+    path: Path  #: path, sha256: the table's file; hash of it, its sidecar and its ball plate, for provenance
     sha256: str
-    sidecar: Sidecar
-    row: IntArray
+    sidecar: Sidecar  #: what the sidecar says; `machine` and `reference` are short for its own
+    row: IntArray  #: (N,) row as a spreadsheet shows it, the header being row 1
+    #: (N,) s on the file's clock, strictly rising, never nan; without `has_time` the number of the row
     time_s: FloatArray
+    #: session, visit, point: (N,) int or None if the column is absent; -1 where the cell is empty. Text ids are
+    #: numbered in sorted order; `labels` has the texts.
     session: IntArray | None
     visit: IntArray | None
     point: IntArray | None
-    scale_mm: FloatArray | None
-    joint_mm: FloatArray | None
+    scale_mm: FloatArray | None  #: (N, n) or None: gL_i, zero at machine zero
+    joint_mm: FloatArray | None  #: (N, k) or None
+    #: (N, 9) or None, in the order t1..t3, u1..u6. None only where the format allows them to be missing.
     frame_mm: FloatArray | None
+    #: (N, n) or None: +1/-1, the direction in which link i last moved; from the columns, else from the scales
+    #: (`compd.travel_direction`); nan where it is not known. With `machine: external` None; gauges and directions are
+    #: quantities then.
     approach: FloatArray | None
-    approach_measured: bool
+    approach_measured: bool  #: whether there are `approach` columns
+    #: full column name with unit -> (N,), in the column's unit: everything that is not named here
     quantities: Mapping[str, FloatArray]
     reference_axes: tuple[str, ...]
+    #: (N, axes) or None: the tip on `reference_axes` (a subset of "x", "y", "z", in this order); for a ball plate the
+    #: calibrated place of the row's ball, all three axes
     reference_mm: FloatArray | None
-    reference_rotation_rad: FloatArray | None
+    reference_rotation_rad: FloatArray | None  #: (N, 3) or None: rotation vector of {P} in {M}
     reference_links: tuple[int, ...]
-    reference_link_mm: FloatArray | None
+    reference_link_mm: FloatArray | None  #: (N, m) or None: change of the links `reference_links` (1-based numbers)
+    #: (N,) or None: from the tip to the fixed end that `ball` names, or to the only one
     reference_distance_mm: FloatArray | None
-    ball: IntArray | None
-    plate: BallPlate | None
+    ball: IntArray | None  #: (N,) int or None, -1 where empty; text names of fixed ends are numbered in sorted order
+    plate: BallPlate | None  #: the ball plate
+    #: (N,) int or None: the fixed pin in which the tip was; -1 where empty, text numbered in sorted order
     pin: IntArray | None
+    #: column of ids -> its texts, by number; columns whose ids are numbers are not among them
     labels: Mapping[str, tuple[str, ...]]
+    #: model_mm, model_rotation_rad, model_link_mm: with `machine: external` the user's own model's prediction, column
+    #: for column as the reference's
     model_mm: FloatArray | None
     model_rotation_rad: FloatArray | None
     model_link_mm: FloatArray | None
-    excluded: BoolArray
-    left_out: Mapping[str, int]
-    columns: Mapping[str, FloatArray]
-    warnings: tuple[Problem, ...] = ()
+    excluded: BoolArray  #: (N,) bool, by the person; the reasons are in `sidecar.excluded`.
+    left_out: Mapping[str, int]  #: reason -> rows of the file that are no row here (no time; empty row between others)
+    columns: Mapping[str, FloatArray]  #: name -> (N,) every column as in the file, in the file's unit
+    warnings: tuple[Problem, ...] = ()  #: what can be used but should be looked at
+    #: whether the file has the time of each row; an external model's rows may be in order without it
     has_time: bool = True
+    #: commanded_mm, commanded_rotation_rad: (N, 3) or None: the pose that the controller of a machine without scales
+    #: was told; nan along an axis that has no column
     commanded_mm: FloatArray | None = None
     commanded_rotation_rad: FloatArray | None = None
+    #: the file's first time, of a block or of chosen rows too; effects and descriptions count from it
     begin_s: float = 0.0
+    #: data that are wrong or look so. Cells that these take as empty are so in `quantities`, not in `columns`.
     faults: tuple[DataFault, ...] = ()
+    #: (N, 3) or None: where the row's reflector is, from the tip along the axes of {P}; nan where the cell is empty;
+    #: None where the tip itself was measured
     target_P_mm: FloatArray | None = None
+    #: where these rows were drawn from a longer recording, what is known of all of it; else None
     sample: RecordingSample | None = None
 
     @property

@@ -54,12 +54,7 @@ _HASHED_BYTES = 1 << 20
 
 
 class RecordingBuilder:
-    """Makes the Recording of one file.
-
-    Attributes
-    ----------
-    id_columns : columns of the table that may hold text.
-    """
+    """Makes the Recording of one file."""
 
     def __init__(self, path: Path, configuration: Configuration | None, needs_reference: bool) -> None:
         """Read the sidecar; `build` reports its faults.
@@ -74,6 +69,7 @@ class RecordingBuilder:
         no_reference = sidecar is not None and sidecar.reference is None and self._reference_valid
         if sidecar is not None and no_reference and (needs_reference or sidecar.external):
             self._problems.append(_no_reference(sidecar))
+        #: columns of the table that may hold text
         self.id_columns = ("point", "pin", "reflector", *["ball"] * _names_fixed_ends(sidecar))
         balls = sidecar.reference.balls if sidecar and sidecar.reference else None
         self._plate = None if balls is None else read_plate(balls, self._problems)

@@ -28,27 +28,16 @@ _NEEDED = ("scale_", "commanded_", "joint_", "frame_", "model_", "reference_")
 
 @dataclass(frozen=True)
 class RecordingSample:
-    """What the pass through the whole recording found.
+    """What the pass through the whole recording found."""
 
-    Attributes
-    ----------
-    row : (R,) rows that were drawn, as a spreadsheet shows them.
-    rows : rows of the recording with a time.
-    untimed : rows of the file without a time, or empty.
-    incomplete : rows without some number of the machine's or the reference's columns.
-    begin_s, end_s : time of the first and of the last row.
-    gap_rows : the longest run of rows of which none was drawn.
-    gap_s : about the time of such a run; nan without time.
-    """
-
-    row: IntArray
-    rows: int
-    untimed: int
-    incomplete: int
-    begin_s: float
+    row: IntArray  #: (R,) rows that were drawn, as a spreadsheet shows them
+    rows: int  #: rows of the recording with a time
+    untimed: int  #: rows of the file without a time, or empty
+    incomplete: int  #: rows without some number of the machine's or the reference's columns
+    begin_s: float  #: begin_s, end_s: time of the first and of the last row
     end_s: float
-    gap_rows: int
-    gap_s: float
+    gap_rows: int  #: the longest run of rows of which none was drawn
+    gap_s: float  #: about the time of such a run; nan without time
 
 
 @dataclass(frozen=True)

@@ -219,32 +219,23 @@ SIDECAR = FileKind(
 
 @dataclass(frozen=True)
 class Sidecar:
-    """A sidecar, checked by itself.
-
-    Attributes
-    ----------
-    machine : name of a machine configuration, or "external".
-    reference : None in a recording of gauges alone, to which `compd recording join` adds one.
-    folds : what cross-validation leaves out: "time", "place" or columns; empty where the sidecar does not say.
-    excluded : spreadsheet row (header = 1) -> the person's reason.
-    provenance, notes : how the recording came to be; kept, never interpreted.
-    format : number of the format that the file was written in.
-    quantities_at_zero : by name, from which effects count; None if the sidecar does not say.
-    trusted : spreadsheet row -> reason why it counts although it looks wrong.
-    machine_file : the machine's configuration; None where the sidecar names none.
-    """
+    """A sidecar, checked by itself."""
 
     path: Path
-    machine: str
-    reference: Reference | None
-    excluded: Mapping[int, str] = field(default_factory=dict)
+    machine: str  #: name of a machine configuration, or "external"
+    reference: Reference | None  #: None in a recording of gauges alone, to which `compd recording join` adds one
+    excluded: Mapping[int, str] = field(default_factory=dict)  #: spreadsheet row (header = 1) -> the person's reason
+    #: provenance, notes: how the recording came to be; kept, never interpreted
     provenance: Mapping[str, Any] = field(default_factory=dict)
     notes: str = ""
-    format: int = FORMAT
+    format: int = FORMAT  #: number of the format that the file was written in
+    #: what cross-validation leaves out: "time", "place" or columns; empty where the sidecar does not say
     folds: tuple[str, ...] = ()
+    #: by name, from which effects count; None if the sidecar does not say
     quantities_at_zero: Mapping[str, float] | None = None
+    #: spreadsheet row -> reason why it counts although it looks wrong
     trusted: Mapping[int, str] = field(default_factory=dict)
-    machine_file: Path | None = None
+    machine_file: Path | None = None  #: the machine's configuration; None where the sidecar names none
 
     @property
     def external(self) -> bool:

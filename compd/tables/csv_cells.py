@@ -84,16 +84,10 @@ def cell_problem(cell: str) -> CellProblem | None:
 
 
 class CsvCells(NamedTuple):
-    """The cells under a header.
+    """The cells under a header."""
 
-    Attributes
-    ----------
-    names : column name -> index of its cells in a row.
-    rows : each as wide as the header; empty rows are left out.
-    """
-
-    names: Mapping[str, int]
-    rows: Sequence[Row]
+    names: Mapping[str, int]  #: column name -> index of its cells in a row
+    rows: Sequence[Row]  #: each as wide as the header; empty rows are left out
 
 
 def read_cells(content: bytes, problems: ProblemList, is_header: HeaderTest, first_row: int) -> CsvCells | None:

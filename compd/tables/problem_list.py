@@ -17,17 +17,13 @@ _LINE_WIDTH = 60
 class ProblemList:
     """Faults of one file.
 
-    Attributes
-    ----------
-    problems : with these the file cannot be used. warnings : it can, but a person should look.
-
     A place is a line of a text file, from 1, or "row 5", "column scale_1_mm (E)"; 0 or "" is the file as a whole.
     """
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        self.problems: list[Problem] = []
-        self.warnings: list[Problem] = []
+        self.problems: list[Problem] = []  #: with these the file cannot be used
+        self.warnings: list[Problem] = []  #: it can, but a person should look
 
     def add(self, place: str | int, what: str, value: str = "", allowed: str = "", next_step: str = "") -> None:
         """Add a problem at a place in this file."""

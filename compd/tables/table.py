@@ -18,24 +18,16 @@ FIRST_ROW = 2
 
 @dataclass(frozen=True)
 class Table:
-    """Columns of numbers of one file, or of a block of its rows.
+    """Columns of numbers of one file, or of a block of its rows."""
 
-    Attributes
-    ----------
-    path : the file.
-    letters : column name -> the letters over it in a spreadsheet, "" for a file that no spreadsheet shows; in order.
-    columns : name -> (N,) float64, nan where the cell is empty (or was reported as wrong).
-    row : (N,) the row as a spreadsheet numbers it; the header is row 1. Empty rows are left out.
-    labels : name -> the different texts of a column of ids, in the order of their codes in `columns`.
-    wrong : names of columns with cells that were reported as wrong.
-    """
-
-    path: Path
+    path: Path  #: the file
+    #: column name -> the letters over it in a spreadsheet, "" for a file that no spreadsheet shows; in order
     letters: Mapping[str, str]
-    columns: dict[str, FloatArray]
-    row: IntArray
+    columns: dict[str, FloatArray]  #: name -> (N,) float64, nan where the cell is empty (or was reported as wrong)
+    row: IntArray  #: (N,) the row as a spreadsheet numbers it; the header is row 1. Empty rows are left out.
+    #: name -> the different texts of a column of ids, in the order of their codes in `columns`
     labels: dict[str, tuple[str, ...]] = field(default_factory=dict)
-    wrong: frozenset[str] = frozenset()
+    wrong: frozenset[str] = frozenset()  #: names of columns with cells that were reported as wrong
 
     def place(self, name: str) -> str:
         """A column for a person: its name and the letters over it."""

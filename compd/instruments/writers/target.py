@@ -23,25 +23,16 @@ class Way:
 
 @dataclass(frozen=True)
 class TargetPoint:
-    """One row of a plan.
+    """One row of a plan."""
 
-    Attributes
-    ----------
-    name : unique in the plan, "P007". purpose : what it is for.
-    tip_M_mm : (3,) place of the tool's tip in {M}; None if the plan sets something else.
-    turn_rad : (3,) turn of the platform since machine zero, a rotation vector in {M}; None where it stays as there.
-    settings : what is to be set or held, by name with unit, in the order in which it is shown.
-    begins : whether it begins a programme. time_s : after the programme's beginning.
-    way : None if the tip may come as it likes, or where no straight way is as wanted.
-    no_way : why there is no such way; "" if there is one, or none is wanted.
-    """
-
-    name: str
-    purpose: str
-    tip_M_mm: FloatArray | None
+    name: str  #: unique in the plan, "P007"
+    purpose: str  #: what it is for
+    tip_M_mm: FloatArray | None  #: (3,) place of the tool's tip in {M}; None if the plan sets something else
+    #: (3,) turn of the platform since machine zero, a rotation vector in {M}; None where it stays as there
     turn_rad: FloatArray | None = None
+    #: what is to be set or held, by name with unit, in the order in which it is shown
     settings: Mapping[str, float] = field(default_factory=dict)
-    begins: bool = True
-    time_s: float = 0.0
-    way: Way | None = None
-    no_way: str = ""
+    begins: bool = True  #: whether it begins a programme
+    time_s: float = 0.0  #: after the programme's beginning
+    way: Way | None = None  #: None if the tip may come as it likes, or where no straight way is as wanted
+    no_way: str = ""  #: why there is no such way; "" if there is one, or none is wanted

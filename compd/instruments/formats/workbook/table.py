@@ -15,20 +15,13 @@ AGAIN = "the header again"
 
 @dataclass(frozen=True)
 class SheetTable:
-    """The list.
+    """The list."""
 
-    Attributes
-    ----------
-    rows : below the header, one or more.
-    header : names of the columns from A on; None without one. header_row : its number; 0 without one.
-    assumed : in words, what was found. left_out : reason -> rows.
-    """
-
-    rows: Sequence[Row]
-    header: tuple[str, ...] | None
-    header_row: int
-    assumed: Mapping[str, str] = field(default_factory=dict)
-    left_out: Mapping[str, int] = field(default_factory=dict)
+    rows: Sequence[Row]  #: below the header, one or more
+    header: tuple[str, ...] | None  #: names of the columns from A on; None without one
+    header_row: int  #: its number; 0 without one
+    assumed: Mapping[str, str] = field(default_factory=dict)  #: in words, what was found
+    left_out: Mapping[str, int] = field(default_factory=dict)  #: reason -> rows
 
 
 def find_table(place: str, rows: Sequence[Row]) -> SheetTable:
