@@ -183,8 +183,9 @@ class Comparison:
     def basis(self) -> str:
         """Of a sample: what it is, and what it leaves uncertain, in sentences; else ""."""
         sample = self.aligned.recording.sample
-        unit = self.aligned.unit
-        return "" if sample is None else sample_text(sample, self.rms_um, self.rms_sampling_error_um, unit)
+        if sample is None:
+            return ""
+        return sample_text(sample, self.rows, self.rms_um, self.rms_sampling_error_um, self.aligned.unit)
 
     @cached_property
     def rms_sampling_error_um(self) -> float:
@@ -375,7 +376,7 @@ class Comparison:
         if recording.sample is not None:
             errors = {label: self._sampling_error(self.residual_um[:, [k]]) for k, label in enumerate(report["axes"])}
             report["sample"] = {
-                **sample_json(recording.sample),
+                **sample_json(recording.sample, self.rows),
                 "residual_rms_standard_error_um": self.rms_sampling_error_um,
                 "residual_rms_standard_error_xyz_um": errors,
                 "text": self.basis,

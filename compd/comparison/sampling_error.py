@@ -40,17 +40,18 @@ def drawn_together(visit: IntArray | None, rows: int) -> IntArray:
     return alone if visit is None else np.where(visit >= 0, visit, alone)
 
 
-def sample_text(sample: RecordingSample, rms_um: float, error_um: float, unit: str) -> str:
+def sample_text(sample: RecordingSample, rows: int, rms_um: float, error_um: float, unit: str) -> str:
     """What was compared and what that leaves uncertain, in sentences.
 
+    rows : that were compared, those that were drawn or some of them.
     error_um : standard error of `rms_um` by the draw.
     """
+    residual, error = format_error(rms_um, unit, 3), format_error(error_um, unit, 2)
     return (
-        f"{len(sample.row):,} of {sample.rows:,} rows{_span(sample)} were compared: a sample. It adds a standard error "
-        f"of {format_error(error_um, unit, 2)} to the residual of {format_error(rms_um, unit, 3)} (rms). The standard "
-        f"errors of parameters are those of the sample. An event shorter than {_gap(sample)} can lie between its rows "
-        f"and be missed. Of all rows {sample.incomplete:,} lack a number of the machine or of the reference, and "
-        f"{sample.untimed:,} are empty or have no time."
+        f"{rows:,} of {sample.rows:,} rows{_span(sample)} were compared: a sample. It adds a standard error of {error} "
+        f"to the residual of {residual} (rms). The standard errors of parameters are those of the sample. An event "
+        f"shorter than {_gap(sample, rows)} can lie between its rows and be missed. Of all rows {sample.incomplete:,} "
+        f"lack a number of the machine or of the reference, and {sample.untimed:,} are empty or have no time."
     )
 
 
@@ -59,20 +60,28 @@ def _span(sample: RecordingSample) -> str:
     return "" if np.isnan(hours) else f" over {number_text(hours, digits=3)} h"
 
 
-def _gap(sample: RecordingSample) -> str:
-    rows = f"{sample.gap_rows:,} rows"
-    return rows if np.isnan(sample.gap_s) else f"about {number_text(sample.gap_s, digits=2)} s ({rows})"
+def _gap(sample: RecordingSample, rows: int) -> str:
+    gap_rows, gap_s = _longest_gap(sample, rows)
+    text = f"{gap_rows:,} rows"
+    return text if np.isnan(gap_s) else f"about {number_text(gap_s, digits=2)} s ({text})"
 
 
-def sample_json(sample: RecordingSample) -> dict[str, Any]:
+def _longest_gap(sample: RecordingSample, rows: int) -> tuple[int, float]:
+    """Rows and seconds; as much longer as fewer rows were compared than were drawn."""
+    longer = max(1.0, len(sample.row) / rows)
+    return round(sample.gap_rows * longer), sample.gap_s * longer
+
+
+def sample_json(sample: RecordingSample, rows: int) -> dict[str, Any]:
     """The numbers of `sample_text` that are of the recording, for programs."""
+    gap_rows, gap_s = _longest_gap(sample, rows)
     return {
-        "rows": len(sample.row),
+        "rows": rows,
         "of": sample.rows,
         "begin_s": sample.begin_s,
         "end_s": sample.end_s,
         "rows_untimed": sample.untimed,
         "rows_incomplete": sample.incomplete,
-        "longest_gap_rows": sample.gap_rows,
-        "longest_gap_s": sample.gap_s,
+        "longest_gap_rows": gap_rows,
+        "longest_gap_s": gap_s,
     }

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import compd
-from compd.comparison import AlignedRecording
+from compd.comparison import AlignedRecording, thinned
 from compd.comparison.recording_comparison import compare
 from compd.comparison.sampling_error import drawn_together, rms_standard_error
 from compd.recording import sample
@@ -102,6 +102,15 @@ def test_its_standard_error_is_told(recorded: Path, rows: int) -> None:
     assert report["residual_rms_standard_error_xyz_um"].keys() == {"x", "y", "z"}
     assert f"{aligned.recording.rows:,} of {ROWS:,} rows over 0.0333 h were compared: a sample." in comparison.basis
     assert f"An event shorter than about {report['longest_gap_s']:.2g} s" in comparison.basis
+
+
+def test_of_fewer_rows_than_were_drawn_these_are_told(recorded: Path) -> None:
+    drawn = compd.open_sample(recorded, rows=200)
+    thin = compare(thinned(drawn, drawn.recording.rows // 2)).as_json()["sample"]
+    whole = compare(drawn).as_json()["sample"]
+    assert thin["rows"] == pytest.approx(whole["rows"] / 2, abs=8)
+    assert thin["longest_gap_rows"] == pytest.approx(2 * whole["longest_gap_rows"], rel=0.1)
+    assert thin["residual_rms_standard_error_um"] > whole["residual_rms_standard_error_um"]
 
 
 @pytest.mark.parametrize("of_visit", [1, 4])
