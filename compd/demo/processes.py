@@ -77,7 +77,7 @@ def simulated_daemon(
         options += [f"--effect={effect}" for effect in effects]
         commands = [
             Command(
-                ["simulate", str(configuration.path), "--directory", temporary, *options],
+                ["sim", "run", str(configuration.path), "--directory", temporary, *options],
                 ready=directory / "control.sock",
             ),
             Command(["run", str(directory / configuration.path.name)], ready=directory / "compd.sock"),

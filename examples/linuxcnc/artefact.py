@@ -98,9 +98,9 @@ def reading_times_s(samples: Sequence[MotionSample]) -> list[tuple[float, float]
 def write_probed_recording(path: Path, gauges: Sequence[Path], rounds: Sequence[Sequence[MotionSample]]) -> int:
     """Write the recording of the probing: one row for each corner and round, with the gauges at rest there.
 
-    gauges : the parts that `compd record` has written meanwhile. rounds : the motion log of each run of the probing
-    program. Returns the number of rows. Corners of a round that was not finished are left out, and so are those for
-    which the gauges were not recorded, or at which the feed was held: the corrections stood.
+    gauges : the parts that `compd recording start` has written meanwhile. rounds : the motion log of each run of the
+    probing program. Returns the number of rows. Corners of a round that was not finished are left out, and so are those
+    for which the gauges were not recorded, or at which the feed was held: the corrections stood.
     """
     recorded = [_recorded(part) for part in gauges]
     rows: list[dict[str, float]] = []
@@ -132,7 +132,7 @@ def write_probed_recording(path: Path, gauges: Sequence[Path], rounds: Sequence[
 
 
 def _recorded(part: Path) -> tuple[FloatArray, list[dict[str, str]]]:
-    """Times (CLOCK_MONOTONIC, s) and cells of a part that `compd record` has written."""
+    """Times (CLOCK_MONOTONIC, s) and cells of a part that `compd recording start` has written."""
     with part.open(newline="") as file:
         rows = list(csv.DictReader(file))
     times_s = np.array([float(row["time_s"]) for row in rows])

@@ -150,7 +150,7 @@ class _Session:
         stem = self._directory / "gauges"
         rounds = []
         record = Command(
-            ["record", str(stem), "--daemon", str(self._directory / "compd.sock")],
+            ["recording", "start", str(stem), "--daemon", str(self._directory / "compd.sock")],
             ready=self._directory / "gauges-0001.csv",
         )
         with run_commands([record], log=self._directory / "record.log"):
@@ -223,7 +223,7 @@ def add_effects(effects: Sequence[str], recording: Path, machine: Path, model: P
     """`compd model add`, for one effect after the other, into a new model file."""
     model.unlink(missing_ok=True)
     for effect in effects:
-        _compd("effect", "add", effect, "--recording", str(recording), "--machine", str(machine), "--model", str(model))
+        _compd("model", "add", effect, "--recording", str(recording), "--machine", str(machine), "--model", str(model))
 
 
 def _compd(*arguments: str) -> str:
