@@ -13,10 +13,13 @@ import numpy as np
 
 from compd.arrays import FloatArray
 from compd.model.effects import Observations, Port, port_numbers
-from compd.model.kernels import DIFFERENCE_STEP_MM, PoseRows, SolvedRows, set_sensitivities
+from compd.model.kernels import PoseRows, SolvedRows, set_sensitivities
 from compd.model.kinematics import Pose, solve_frame
 from compd.model.machine import MachineModel
 from compd.model.structures import RESULT, WORKSPACE
+
+# As `compd.model.kernels.tip_sensitivity.DIFFERENCE_STEP_MM`.
+_STEP_MM = 1e-3
 
 
 class Sensitivity(NamedTuple):
@@ -108,7 +111,7 @@ def link_residuals(link: Sensitivity, tip_residual_mm: FloatArray) -> FloatArray
 def carried_by_distances(model: MachineModel, distances_mm: FloatArray, scale_mm: FloatArray) -> dict[Port, FloatArray]:
     """Derivatives by the frame's distances (N, 9), with the scales at (N, m), of what the base carries: base joints in
     {M}, (N, 3 n, 9), and axes of hinges, (N, 3 k, 9), where it has these; by central differences."""
-    steps = DIFFERENCE_STEP_MM * np.concatenate([np.eye(9), -np.eye(9)])
+    steps = _STEP_MM * np.concatenate([np.eye(9), -np.eye(9)])
     frame = solve_frame(model.frame, distances_mm + steps[:, None])
     mechanism, _ = model.links_on(frame.rotation_M_B, frame.base_joints_M_mm, scale_mm)
     carried: dict[Port, FloatArray] = {"base_joint": _central_difference(mechanism.base_joints_M_mm, len(scale_mm))}
@@ -120,7 +123,7 @@ def carried_by_distances(model: MachineModel, distances_mm: FloatArray, scale_mm
 def _central_difference(stepped_mm: FloatArray, count: int) -> FloatArray:
     """From vectors (18, count, n, 3), nine steps forwards and nine backwards, to derivatives (count, 3 n, 9)."""
     ends = stepped_mm.reshape(18, count, -1)
-    return np.asarray(np.moveaxis((ends[:9] - ends[9:]) / (2 * DIFFERENCE_STEP_MM), 0, 2))
+    return np.asarray(np.moveaxis((ends[:9] - ends[9:]) / (2 * _STEP_MM), 0, 2))
 
 
 def _extension(model: MachineModel) -> FloatArray:

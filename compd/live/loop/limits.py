@@ -13,7 +13,7 @@ from compd.operation_settings import LimitSettings
 from compd.setpoint_states import State
 
 _LINKS = tuple(f"link {link}" for link in range(1, 7))
-# A step may exceed the slew limit by this much, which is rounding, without being reported as slewing.
+# A correction or its step may exceed its limit by this much, which is rounding, without being reported.
 _ROUNDING_MM = 1e-12
 
 
@@ -46,7 +46,7 @@ def limit_correction(
     previous = previous_mm.tolist()
     largest, step = limits.correction_mm, limits.slew_mm_per_s * period_s
     for value, before in zip(wanted, previous, strict=True):
-        if not (-largest <= value <= largest and abs(value - before) <= step + _ROUNDING_MM):
+        if not (abs(value) <= largest + _ROUNDING_MM and abs(value - before) <= step + _ROUNDING_MM):
             break
     else:  # nearly always
         return LimitedCorrection(wanted_mm, State.OK, "")
@@ -54,7 +54,7 @@ def limit_correction(
         return LimitedCorrection(
             previous_mm, State.REFUSED, f"{_first_not_finite(wanted, names)}, refused; the last one is kept"
         )
-    beyond = [link for link, value in enumerate(wanted) if abs(value) > largest]
+    beyond = [link for link, value in enumerate(wanted) if abs(value) > largest + _ROUNDING_MM]
     if beyond and limits.on_limit == "refuse":
         return LimitedCorrection(previous_mm, State.REFUSED, _beyond(beyond, wanted, largest, "refused", names))
     allowed = [min(max(value, -largest), largest) for value in wanted]

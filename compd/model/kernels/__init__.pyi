@@ -27,5 +27,4 @@ from .solve_status import AMPLIFICATION_LIMIT as AMPLIFICATION_LIMIT
 from .solve_status import Reason as Reason
 from .solve_status import require as require
 from .tip_derivatives import set_tip_derivatives as set_tip_derivatives
-from .tip_sensitivity import DIFFERENCE_STEP_MM as DIFFERENCE_STEP_MM
 from .tip_sensitivity import set_sensitivities as set_sensitivities

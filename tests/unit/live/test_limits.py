@@ -86,3 +86,10 @@ def test_what_is_not_finite_is_refused_even_where_clamping_is_wanted(bad, limits
     assert result.applied_mm is previous
     assert "link 2" in result.reason
     assert "not finite" in result.reason
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+@pytest.mark.parametrize(("above_mm", "state"), [(5e-13, State.OK), (1e-9, State.CLAMPED)])
+def test_what_is_beyond_the_limit_by_rounding_alone_is_not_clamped(sign, above_mm, state):
+    wanted = np.array([0.0, sign * (MAX_MM + above_mm), 0.0])
+    assert limit_correction(wanted, wanted, PERIOD_S, CLAMP).state is state
