@@ -30,12 +30,6 @@ class EffectMemory:
     """What effects hand from one snapshot to the next; it is never changed in place.
 
     From one cycle to the next it stays packed, as the kernel left it.
-
-    Attributes
-    ----------
-    motion : of the links, where an effect depends on it; None before the first snapshot.
-    memories : by effect id.
-    commanded : whether that motion is of commanded scales (machine-tool mode) and not of scales as read.
     """
 
     def __init__(
@@ -46,11 +40,12 @@ class EffectMemory:
         packed: PackedMemory | None = None,
     ) -> None:
         """`packed`: in the place of motion and memories."""
+        #: whether that motion is of commanded scales (machine-tool mode) and not of scales as read
         self.commanded = commanded
         self._packed = packed
         if packed is None:
-            self.motion = motion
-            self.memories = memories
+            self.motion = motion  #: of the links, where an effect depends on it; None before the first snapshot
+            self.memories = memories  #: by effect id
 
     @cached_property
     def motion(self) -> Motion | None:

@@ -41,24 +41,17 @@ def port_numbers(links: int, joints: int, axes: int) -> dict[Port, range]:
 
 
 class EffectProgram(NamedTuple):
-    """K effects of a machine as the kernel reads them.
+    """K effects of a machine as the kernel reads them."""
 
-    Attributes
-    ----------
-    arrays : what the kernel takes.
-    quantities : names of all that are needed.
-    references : those from which effects count: each name of `quantities`, and its value; None where that is the one at
-        machine zero.
-    states : where each array of each effect's memory begins and ends, by the effect's id.
-    size : of all ports together.
-    given : indices of the effects that are plain Python: what they add is computed outside the kernel.
-    """
-
-    arrays: EffectArrays
-    quantities: tuple[str, ...]
+    arrays: EffectArrays  #: what the kernel takes
+    quantities: tuple[str, ...]  #: names of all that are needed
+    #: those from which effects count: each name of `quantities`, and its value; None where that is the one at machine
+    #: zero
     references: tuple[tuple[str, float | None], ...]
+    #: where each array of each effect's memory begins and ends, by the effect's id
     states: Mapping[str, tuple[tuple[int, int], ...]]
-    size: int
+    size: int  #: of all ports together
+    #: indices of the effects that are plain Python: what they add is computed outside the kernel
     given: tuple[int, ...]
 
     @property

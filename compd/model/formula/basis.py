@@ -32,16 +32,10 @@ SENSITIVITY_PORTS: tuple[Port, ...] = tuple(_SENSITIVITY_COLUMNS)
 
 @dataclass(frozen=True)
 class FormulaBasis:
-    """The basis of one formula, or of several along axes of a port of vectors.
+    """The basis of one formula, or of several along axes of a port of vectors."""
 
-    Attributes
-    ----------
-    formulas : axis -> formula; the axis is "" at a port without direction.
-    to_mm : what a formula's value of 1 is in mm.
-    """
-
-    formulas: Mapping[str, Formula]
-    to_mm: float
+    formulas: Mapping[str, Formula]  #: axis -> formula; the axis is "" at a port without direction
+    to_mm: float  #: what a formula's value of 1 is in mm
 
     def program(self, effect: Effect, links: int, sizes: Mapping[Port, int]) -> BasisProgram:
         """See `compd.model.effects.effect.CompiledBasis`."""

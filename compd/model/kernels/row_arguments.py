@@ -19,25 +19,17 @@ from compd.model.structures import EFFECT_MACHINE, EFFECTS, RESULTS, WORKSPACES
 
 
 class EffectArrays(NamedTuple):
-    """K effects of a machine.
+    """K effects of a machine."""
 
-    Attributes
-    ----------
-    machine : (1,), of `compd.model.structures.effect_row.MACHINE`: what all rows have in common.
-    effects : (K,), of `compd.model.structures.solver_structures.EFFECT`.
-    theta, numbers, code : of all effects, behind one another.
-    quantity_indices : of each effect's quantities, now and then at machine zero, in a row of the program's `quantities`
-        and `references` behind one another.
-    targets : of each effect's numbers among those of all ports.
-    """
-
-    machine: Any
-    effects: Any
-    theta: FloatArray
+    machine: Any  #: (1,), of `compd.model.structures.effect_row.MACHINE`: what all rows have in common.
+    effects: Any  #: (K,), of `compd.model.structures.solver_structures.EFFECT`.
+    theta: FloatArray  #: theta, numbers, code: of all effects, behind one another
     numbers: FloatArray
     code: IntArray
+    #: of each effect's quantities, now and then at machine zero, in a row of the program's `quantities` and
+    #: `references` behind one another
     quantity_indices: IntArray
-    targets: IntArray
+    targets: IntArray  #: of each effect's numbers among those of all ports
 
 
 class GaugeRows(NamedTuple):
