@@ -52,15 +52,20 @@ ZERO_FILE = FileKind(
 
 @dataclass(frozen=True)
 class MachineZero:
-    """Raw readings of all length gauges at machine zero, and the quantities there."""
+    """Raw readings of all length gauges at machine zero, and the quantities there.
 
-    zero_hash: str  #: of geometry, gauges and wiring. The zero of a machine with another hash must not be used.
-    taken_at: str  #: UTC, ISO 8601, for people
-    readings_mm: Mapping[str, float]  #: by "gauge.channel", as read: before any sign.
-    #: temperatures, forces and so on by name, in their own units, from which effects count; of a zero of a release up
-    #: to 0.2, and of one that was taken without the gauge, it is not there.
+    zero_hash : of geometry, gauges and wiring. The zero of a machine with another hash must not be used.
+    taken_at : UTC, ISO 8601, for people.
+    readings_mm : by "gauge.channel", as read: before any sign.
+    quantities : temperatures, forces and so on by name, in their own units, from which effects count; of a zero of a
+        release up to 0.2, and of one that was taken without the gauge, it is not there.
+    ports : lasting names of the ports where they were read, by gauge; only in the file, not in recordings.
+    """
+
+    zero_hash: str
+    taken_at: str
+    readings_mm: Mapping[str, float]
     quantities: Mapping[str, float] = field(default_factory=dict)
-    #: lasting names of the ports where they were read, by gauge; only in the file, not in recordings
     ports: Mapping[str, str] = field(default_factory=dict)
 
     def to_json(self) -> dict[str, Any]:

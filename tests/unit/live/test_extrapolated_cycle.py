@@ -215,7 +215,7 @@ def test_a_run_on_the_move_replays_bit_for_bit_and_says_how_each_length_moves(tm
             recorder.put(line, message)
             sent.append(setpoint.to_json())
     assert len(set(sent)) == 30
-    ReadingsKeys.model_validate({key: message[key] for key in message if key != "class"})
+    ReadingsKeys.model_validate_json(json.dumps({key: message[key] for key in message if key != "class"}))
     assert message["readings"]["scale_1.position"]["motion"]["speed_mm_per_s"] == SPEED_MM_PER_S
     replayed = list(replay_cycles(run.machine.configuration, RecordedCycles(tmp_path / "run")))
     assert [cycle.replayed for cycle in replayed] == sent
