@@ -85,7 +85,7 @@ DOCUMENTED := tests/system/test_pages.py tests/system/test_contributing.py
 
 # What runs a daemon or a browser in real time. It waits as much as it computes: two side by side are still in time, but
 # not beside tests that compute.
-REAL_TIME := $(addprefix tests/system/,page processes linuxcnc test_chain.py test_demo.py test_fault_matrix.py \
+REAL_TIME := $(addprefix tests/system/,page processes linuxcnc test_budget.py test_chain.py test_demo.py test_fault_matrix.py \
   test_half_open_connections.py test_pushed_lines.py test_reference_examples.py test_simultaneous_sampling.py)
 COMPUTED := $(REAL_TIME:%=--ignore=%) $(HIDDEN:%=--ignore=%)
 # Files are shared out whole: what the tests of one share is made once.
