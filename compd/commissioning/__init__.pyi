@@ -17,10 +17,10 @@ from .jump_trials import FeignedJump as FeignedJump
 from .jump_trials import feigned_jumps as feigned_jumps
 from .jump_trials import jump_warnings as jump_warnings
 from .jump_trials import named_together as named_together
+from .jump_trials import period_warnings as period_warnings
 from .jump_trials import reply_warnings as reply_warnings
 from .line_budget import LineBudget as LineBudget
 from .line_budget import line_budgets as line_budgets
 from .line_warnings import budget_warnings as budget_warnings
-from .pushed_periods import period_warnings as period_warnings
 from .refused_setpoints import certain_refusal as certain_refusal
 from .shared_addresses import shared_address_warnings as shared_address_warnings

@@ -7,8 +7,8 @@ from .criteria import ComparisonCriteria as ComparisonCriteria
 from .effect_fit import FitResult as FitResult
 from .effect_fit import fit as fit
 from .effect_fit import initial_effect as initial_effect
-from .initial_states import initial_state_columns as initial_state_columns
 from .neighbour_block import neighbour_blocks as neighbour_blocks
+from .nuisance import initial_state_columns as initial_state_columns
 from .nuisance import nuisance_beside as nuisance_beside
 from .nuisance import nuisance_columns as nuisance_columns
 from .open import is_long as is_long

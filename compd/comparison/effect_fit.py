@@ -24,6 +24,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import TypeAlias
 
 import numpy as np
 
@@ -32,11 +33,25 @@ from compd.comparison.alignment.aligned_recording import AlignedRecording, effec
 from compd.comparison.neighbour_block import neighbour_blocks
 from compd.comparison.nuisance import nuisance_beside
 from compd.comparison.outliers import outlier_rows
-from compd.comparison.quantity_ranges import Ranges, quantity_ranges
 from compd.errors import CompdError
-from compd.model.effects import ConstantValues, Effect, FittedEffect
+from compd.model.effects import ConstantValues, Effect, FittedEffect, Observations, needed_quantities
 from compd.statistics import cluster_covariance, huber_weights, solve_least_squares
 from compd.units import UM_PER_MM
+
+# Lowest and highest value of each quantity, by its name.
+Ranges: TypeAlias = Mapping[str, tuple[float, float]]
+
+
+def quantity_ranges(fitted: Sequence[FittedEffect], rows: Observations, used: BoolArray) -> Ranges:
+    """Of each quantity that the effects read, in the rows `used` (N,); without those that have no value there."""
+    ranges: dict[str, tuple[float, float]] = {}
+    for effect in fitted:
+        for name in needed_quantities(effect.effect, rows.links):
+            values = rows.quantities[name][used] if name in rows.quantities else np.array([])
+            if np.isfinite(values).any():
+                ranges[name] = float(np.nanmin(values)), float(np.nanmax(values))
+    return ranges
+
 
 _LOOK_AT_FORMULA = (
     "look at its formula: exp of a large number, a root or logarithm of a negative one, or a division by 0 has no value"

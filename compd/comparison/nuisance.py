@@ -6,17 +6,64 @@ the states that nobody knew when a session began, of the model's effects with me
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
-from compd.arrays import BoolArray, FloatArray
+from compd.arrays import BoolArray, FloatArray, IntArray
 from compd.comparison.alignment.aligned_recording import AlignedRecording
-from compd.comparison.initial_states import initial_state_columns
-from compd.model.effects import FittedEffect
+from compd.model.effects import ConstantValues, Effect, FittedEffect, Observations, evaluate_basis
 from compd.statistics import column_norms, robust_regression, solve_least_squares
 from compd.units import UM_PER_MM
+
+
+def initial_state_columns(aligned: AlignedRecording, effect: Effect, constants: ConstantValues) -> FloatArray:
+    """(N, m, Q) by how many um each unknown state at the start of each session moves the prediction, per unit of it.
+
+    The Q states are those of the first session, then of the next; a state moves only the rows of its own session. None,
+    Q = 0, for an effect without unknown states.
+    """
+    rows = aligned.rows
+    sessions = _sessions(rows) if effect.unknown_states else ()
+    columns = [column for session in sessions for column in _session_columns(effect, constants, rows, session)]
+    if not columns:
+        return np.zeros((*aligned.measured_mm.shape, 0))
+    return aligned.propagated(effect, np.stack(columns, axis=2)) * UM_PER_MM
+
+
+def _sessions(rows: Observations) -> Iterator[IntArray]:
+    """The rows of each session."""
+    yield from np.split(np.arange(len(rows)), np.flatnonzero(rows.session_start[1:]) + 1)
+
+
+def _session_columns(
+    effect: Effect, constants: ConstantValues, rows: Observations, session: IntArray
+) -> Iterator[FloatArray]:
+    """(N, sum of port sizes) each: what a state at the start of one session adds for 1 of each fitted number, mm.
+
+    The session begins with the first row in which the effect is known. States that move nothing are left out.
+    """
+    basis, _ = evaluate_basis(effect, rows.select(session), constants, None)
+    known = np.isfinite(basis).all(axis=(1, 2))
+    if not known.any():
+        return
+    session = session[int(np.argmax(known)) :]
+    _, memory = evaluate_basis(effect, rows.select(session[:1]), constants, None)
+    assert memory is not None
+    later = replace(rows.select(session), session_start=np.zeros(len(session), dtype=bool))
+    without, _ = evaluate_basis(effect, later, constants, memory)
+    for place in effect.unknown_states:
+        for state in range(len(memory[place])):
+            greater = [array.copy() for array in memory]
+            greater[place][state] += 1.0
+            moved = evaluate_basis(effect, later, constants, tuple(greater))[0] - without
+            for number in np.flatnonzero((np.nan_to_num(moved) != 0).any(axis=(0, 1))):
+                column = np.zeros((len(rows), moved.shape[1]))
+                column[session] = moved[:, :, number]
+                yield column
+
 
 # What is fitted along is an effect's own where the effect leaves less of it than this share.
 MIN_SHARE = 1e-4

@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any, Literal, get_args, get_origin
+
+from pydantic import ValidationError
 
 from compd.conformance import faults
 from compd.conformance.case_result import (
@@ -22,11 +26,37 @@ from compd.conformance.case_result import (
 )
 from compd.conformance.damage_cases import fault_at, good_poll
 from compd.conformance.harness import ConformanceSession
-from compd.conformance.other_settings import other_settings
 from compd.conformance.peer import GOLDEN
 from compd.conformance.reply_text import Forgery, ReplyText, most_frequent_length
 from compd.conformance.value_cases import share_of
-from compd.gauge import Quality
+from compd.gauge import GaugeOptions, Quality
+
+
+def other_settings(options: GaugeOptions) -> Iterator[tuple[str, GaugeOptions]]:
+    """The change ("address=2") and the options, for whole numbers, texts ending in one, choices, switches."""
+    for name, field in type(options).model_fields.items():
+        if name in GaugeOptions.model_fields:
+            continue
+        for value in _others(getattr(options, name), field.annotation):
+            try:
+                other = type(options).model_validate({**options.model_dump(exclude_unset=True), name: value})
+            except (ValidationError, ValueError):
+                continue
+            yield f"{name}={value}", other
+
+
+def _others(value: Any, annotation: Any) -> list[Any]:
+    """Other values of the same kind; [] if unknown."""
+    if get_origin(annotation) is Literal:
+        return [choice for choice in get_args(annotation) if choice != value]
+    if isinstance(value, bool):
+        return [not value]
+    if isinstance(value, int):
+        return [value + 1, value - 1]
+    if isinstance(value, str) and (digits := re.search(r"\d+$", value)):
+        return [value[: digits.start()] + f"{int(digits[0]) + 1:0{len(digits[0])}d}"[-len(digits[0]) :]]
+    return []
+
 
 # Modbus exceptions: all of a slave or gateway for a read, and one outside every table.
 EXCEPTIONS = (1, 2, 3, 4, 5, 6, 7, 8, 10, 11, 0x5A)

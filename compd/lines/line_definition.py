@@ -1,7 +1,7 @@
 """The definition of a kind of line: its keys, how it is opened, its twin, its time budget, how the doctor looks at it.
 
 A kind is a folder in `compd/lines/kinds`, named as `kind` in the configuration, whose `__init__` has a `KIND`. All else
-asks `compd.lines.registry`. What is heavy, or needs a library of its own, is imported by the method that needs it: the
+asks `compd.lines.open`. What is heavy, or needs a library of its own, is imported by the method that needs it: the
 definitions are read whenever a configuration is.
 
 A kind that is polled derives from `PolledDefinition`, or from what it shares with others: `SerialDefinition`,

@@ -2,15 +2,64 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
+from importlib import import_module
+from pkgutil import iter_modules
+from types import GenericAlias
+from typing import TYPE_CHECKING, Annotated, Any, Union
+
+from pydantic import Field
 
 from compd.clock import Clock
 from compd.line_settings import LineSettings, PolledLineSettings
+from compd.lines import kinds
 from compd.lines.line import Line, WrapPort, unchanged
-from compd.lines.registry import definition_of, polled_definition
+from compd.lines.line_definition import LineDefinition, PolledDefinition
 
 if TYPE_CHECKING:
     from compd.lines.stream import StreamLine
+
+
+def _definitions() -> dict[str, LineDefinition]:
+    found: list[LineDefinition] = []
+    for folder in iter_modules(kinds.__path__):
+        definition: LineDefinition = import_module(f"{kinds.__name__}.{folder.name}").KIND
+        assert definition.kind == folder.name, f"compd/lines/kinds/{folder.name} has the kind {definition.kind}"
+        found.append(definition)
+    return {definition.kind: definition for definition in sorted(found, key=lambda one: (one.order, one.kind))}
+
+
+KINDS: Mapping[str, LineDefinition] = _definitions()
+# The keys of a line of any kind, and of several lines by name, for pydantic.
+ANY_LINE: Any = Annotated[Union[tuple(kind.settings for kind in KINDS.values())], Field(discriminator="kind")]  # noqa: UP007
+LINES_BY_NAME: Any = GenericAlias(dict, (str, ANY_LINE))
+
+
+def readable_definition(line: Any) -> LineDefinition | None:
+    """Of the kind of a line of which only a part could be read; None where its kind could not."""
+    return KINDS.get(getattr(line, "kind", None) or "")
+
+
+def definition_of(settings: LineSettings) -> LineDefinition:
+    """Of the line's kind."""
+    return KINDS[settings.kind]
+
+
+def polled_definition(settings: PolledLineSettings) -> PolledDefinition:
+    """Of the line's kind."""
+    return polled_kind(settings.kind)
+
+
+def polled_kind(kind: str) -> PolledDefinition:
+    """The kind of this name, whose gauges are polled."""
+    definition = KINDS[kind]
+    assert isinstance(definition, PolledDefinition), f"gauges on lines of kind {kind} are not polled"
+    return definition
+
+
+def kinds_that_carry(carries: str) -> list[LineDefinition]:
+    """The kinds on which drivers find `carries`, as `Gauge.line_kind` has it."""
+    return [kind for kind in KINDS.values() if kind.carries == carries]
 
 
 def open_line(settings: LineSettings, clock: Clock, wrap_port: WrapPort = unchanged) -> Line:

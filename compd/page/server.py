@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import io
 import json
 import math
 import shlex
@@ -10,7 +11,9 @@ from collections.abc import AsyncIterator, Sequence
 from contextlib import asynccontextmanager
 from dataclasses import asdict
 from pathlib import Path
+from typing import TextIO
 
+import segno
 from starlette.applications import Starlette
 from starlette.exceptions import HTTPException
 from starlette.middleware import Middleware
@@ -32,12 +35,28 @@ from compd.page.limited_protocol import LimitedProtocol
 from compd.page.logbook import Logbook
 from compd.page.model_files import ModelFiles
 from compd.page.orders import Orders, explained
-from compd.page.qr_code import svg_qr_code
 from compd.page.recordings import Recordings
 from compd.page.requests import LOOKS_ONLY, MAX_BODY_BYTES, answer, asked_by, keys_of, may_change, note_change, refused
 from compd.page.workbench.routes import WorkbenchRoutes
 from compd.page.workers.workers import Workers
 from compd.report import AXES_CSS
+
+# Width of the quiet zone around the code, in modules (ISO/IEC 18004).
+_BORDER = 4
+_SCALE = 4
+
+
+def print_qr_code(text: str, out: TextIO) -> None:
+    """Draw it on a terminal."""
+    segno.make_qr(text).terminal(out, border=_BORDER, compact=True)
+
+
+def svg_qr_code(text: str) -> bytes:
+    """The code as an SVG document, dark on white on any background."""
+    out = io.BytesIO()
+    segno.make_qr(text).save(out, kind="svg", scale=_SCALE, border=_BORDER, light="#fff", dark="#000", title="QR code")
+    return out.getvalue()
+
 
 STATIC = Path(__file__).parent / "static"
 # Longest burst (s): an hour at 1 kHz takes some gigabytes.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Collection, Iterable
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
@@ -33,19 +33,74 @@ from compd.recording.checks import (
     check_usable_rows,
     check_values,
 )
-from compd.recording.kept_rows import kept_rows
 from compd.recording.layout import Layout, machine_problems, read_layout
 from compd.recording.quantity_faults import hanging_reference, quantity_faults, without_wild
 from compd.recording.quaternion import with_rotation_vectors
 from compd.recording.recording import Recording
 from compd.recording.reference_faults import reference_faults
-from compd.recording.reflectors import check_reflectors, reflector_places_mm
 from compd.recording.sample import DrawnRows
 from compd.recording.sidecar import Sidecar, read_sidecar
 from compd.recording.visits import pose_mm, unique_visits
+from compd.statistics import doubled_rows
 from compd.tables import FIRST_ROW, ProblemList, Table, rows_text
 from compd.travel_direction import row_directions
 from compd.units import UM_PER_MM
+
+COLUMN = "reflector"
+
+
+def check_reflectors(table: Table, places_mm: Mapping[str, tuple[float, float, float]], problems: ProblemList) -> None:
+    """Add a problem for every name in the column that the sidecar gives no place. The layout reports a missing column.
+
+    places_mm : by name, from the tip along the axes of {P}.
+    """
+    if COLUMN not in table.columns:
+        return
+    if unknown := sorted(set(_names(table)) - {"", *places_mm}):
+        problems.add(
+            "",
+            f"{COLUMN}: the sidecar gives no place of it",
+            ", ".join(unknown[:5]),
+            ", ".join(places_mm),
+            "mend the name, or add its place to `reference.reflectors`",
+        )
+
+
+def reflector_places_mm(table: Table, places_mm: Mapping[str, tuple[float, float, float]]) -> FloatArray:
+    """(N, 3) place of each row's reflector, from the tip along the axes of {P}; nan where the cell is empty.
+
+    places_mm : as of `check_reflectors`, which the table has passed.
+    """
+    unknown = (np.nan, np.nan, np.nan)
+    return np.array([places_mm.get(name, unknown) for name in _names(table)], dtype=np.float64).reshape(-1, 3)
+
+
+def _names(table: Table) -> list[str]:
+    """The reflector of each row as the sidecar names it, "" for an empty cell."""
+    labels = table.labels.get(COLUMN)
+    ids = [None if np.isnan(value) else int(value) for value in table.columns[COLUMN]]
+    return ["" if i is None else labels[i] if labels else str(i) for i in ids]
+
+
+NO_TIME, DOUBLED = "time_s is empty", "each row was written twice"
+
+
+def kept_rows(columns: Mapping[str, FloatArray]) -> tuple[IntArray, dict[str, int]]:
+    """The rows of a table in the order of time; and reason -> number of the rows that are left out.
+
+    columns : (N,) by name, `time_s` among them. A row without a time is no row. Where every row was written twice, the
+    second of each two is none; where a column `point` tells rows at rest from those of motions, each kind by itself.
+    """
+    timed = ~np.isnan(columns["time_s"])
+    kept = np.argsort(columns["time_s"], kind="stable")[: int(timed.sum())]
+    others = [column[kept] for name, column in columns.items() if name != "time_s"]
+    values = np.column_stack([np.zeros((len(kept), 0)), *others])
+    at_rest = np.isfinite(columns["point"][kept]) if "point" in columns else np.ones(len(kept), dtype=bool)
+    doubled = np.zeros(len(kept), dtype=bool)
+    for kind in (at_rest, ~at_rest):
+        doubled[kind] = doubled_rows(values[kind])
+    return kept[~doubled], {NO_TIME: int((~timed).sum()), DOUBLED: int(doubled.sum())}
+
 
 # Decimals (mm) of comparators converted from um: a picometre, far below any gauge, so that a reading written in
 # decimals comes back as the gauge's number.

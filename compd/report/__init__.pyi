@@ -6,12 +6,13 @@ from .comparison_table import name_of as name_of
 from .comparison_table import no_trend_text as no_trend_text
 from .comparison_table import summary as summary
 from .diagnosis_page import write_diagnosis_page as write_diagnosis_page
+from .diagnosis_text import keep_words_whole as keep_words_whole
 from .diagnosis_text import print_diagnosis as print_diagnosis
 from .effect_page import write_effect_page as write_effect_page
 from .evidence_json import evidence as evidence
+from .ledger_page import LEDGER_HEAD as LEDGER_HEAD
+from .ledger_page import ledger_rows as ledger_rows
 from .ledger_page import write_ledger_page as write_ledger_page
-from .ledger_table import LEDGER_HEAD as LEDGER_HEAD
-from .ledger_table import ledger_rows as ledger_rows
 from .machine_drawing import machine_lines as machine_lines
 from .machine_drawing import machine_svg as machine_svg
 from .page import COLOURS as COLOURS
@@ -22,4 +23,3 @@ from .page import write_page as write_page
 from .page_table import PageTable as PageTable
 from .small_multiples import COLUMNS as COLUMNS
 from .small_multiples import SERIES_COLOURS as SERIES_COLOURS
-from .terminal_table import keep_words_whole as keep_words_whole

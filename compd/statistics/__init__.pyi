@@ -13,7 +13,7 @@ from .least_squares import ridge_inverse as ridge_inverse
 from .least_squares import solve_least_squares as solve_least_squares
 from .least_squares import solve_normal as solve_normal
 from .least_squares import solve_ridge as solve_ridge
-from .period_criteria import PeriodCriteria as PeriodCriteria
+from .periodogram import PeriodCriteria as PeriodCriteria
 from .periodogram import PeriodLimits as PeriodLimits
 from .periodogram import shortest_period as shortest_period
 from .periodogram import strongest_periods as strongest_periods

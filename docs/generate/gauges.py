@@ -10,7 +10,7 @@ from compd.gauge import Gauge, GaugeOptions, Quality
 from compd.gauge_tools import catalogue
 from compd.gauge_tools.driver_catalogue import GIVEN_BY_THE_CONFIGURATION, driver_text
 from compd.lines import kinds_that_carry
-from compd.lines.registry import KINDS
+from compd.lines.open import KINDS
 from compd.plugins import GAUGES, load
 from compd.text import join_words
 from docs.generate.configuration import keys_table

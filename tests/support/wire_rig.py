@@ -15,7 +15,7 @@ from compd.clock import MonotonicClock
 from compd.gauge import Gauge, LineFault, Quality, Reading
 from compd.line_settings import LineSettings
 from compd.lines import open_line
-from compd.lines.registry import ANY_LINE
+from compd.lines.open import ANY_LINE
 from compd.live.memory import Latest
 from compd.plugins import GAUGES, SIMULATED_GAUGES, load
 from compd.simulation.wires.simulated_line import SimulatedLine

@@ -34,8 +34,7 @@ from compd.plugins import load as load_plugin
 from compd.setpoint_states import State
 from compd.simulation import World as Truth
 from compd.simulation.truth.motion import DRIVES, Drives
-from compd.simulation.wires.live_world import LiveWorld
-from compd.simulation.wires.server import STEP_S, Sensing
+from compd.simulation.wires.server import STEP_S, LiveWorld, Sensing
 from tests.worlds.hub import Hub
 from tests.worlds.wires import Wire, opened_virtually
 

@@ -7,13 +7,13 @@ from .cycle import step as step
 from .cycle_state import CycleInputs as CycleInputs
 from .cycle_state import CycleSettings as CycleSettings
 from .cycle_state import CycleState as CycleState
-from .directions import Directions as Directions
 from .loop import Loop as Loop
 from .own_time import TimedKinematics as TimedKinematics
 from .pipeline import Pipeline as Pipeline
 from .pipeline import build_pipeline as build_pipeline
 from .ring_entries import CyclePacker as CyclePacker
 from .ring_entries import CycleUnpacker as CycleUnpacker
+from .ring_entries import Directions as Directions
 from .ring_entries import SentCycle as SentCycle
 from .setpoint import Setpoint as Setpoint
 from .setpoint import setpoint_line as setpoint_line

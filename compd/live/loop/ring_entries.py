@@ -8,15 +8,43 @@ that it left.
 from __future__ import annotations
 
 import pickle
+from collections.abc import Sequence
 from typing import NamedTuple
 
 from compd.errors import StateError
+from compd.gauge import Quality
 from compd.live.loop.carried_state import pack_state, unpack_state
 from compd.live.loop.cycle_state import CycleInputs, CycleState
-from compd.live.loop.directions import Directions
 from compd.live.loop.setpoint import Setpoint
-from compd.live.machine import MachineZero, ModelNames, Models
+from compd.live.machine import MachineZero, ModelNames, Models, Wire
 from compd.live.memory import Readings, Snapshot
+from compd.travel_direction import Travel, advance
+
+
+class Directions:
+    """Direction of travel of each link from its scale; a sink of the loop.
+
+    A recording of a few rows per second would miss a link that goes out and comes back between two rows.
+    """
+
+    def __init__(self, scales: Sequence[Wire]) -> None:
+        self._wires = tuple((wire.slot, wire.sign) for wire in scales)
+        self._travels = [Travel()] * len(self._wires)
+
+    @property
+    def now(self) -> list[int]:
+        """(n,) +1 or -1; 0 before the link has moved."""
+        return [int(travel.direction) for travel in self._travels]
+
+    def update(self, setpoint: Setpoint) -> None:
+        """Take the good readings of one cycle."""
+        assert setpoint.inputs is not None
+        readings = setpoint.inputs.snapshot.readings
+        for link, (slot, sign) in enumerate(self._wires):
+            value, _, quality, *_ = readings[slot]
+            if quality is Quality.OK:
+                self._travels[link] = advance(self._travels[link], sign * value)
+
 
 _PICKLE_PROTOCOL = 5
 NO_MODELS = ModelNames({}, {})

@@ -1,10 +1,10 @@
-from .agreement import Agreement as Agreement
 from .compared_table import differing_cells as differing_cells
 from .readings_feed import ReadingsFeed as ReadingsFeed
 from .recorder import Recorder as Recorder
 from .recorder import RecordingLimits as RecordingLimits
 from .recording_part import CYCLES_SUFFIX as CYCLES_SUFFIX
 from .recording_part import MODEL_MARK as MODEL_MARK
+from .replay import Agreement as Agreement
 from .replay import RecordedCycles as RecordedCycles
 from .replay import ReplayedCycle as ReplayedCycle
 from .replay import replay_cycles as replay_cycles

@@ -6,8 +6,9 @@ import json
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from enum import StrEnum
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from compd.columns import SKEW_COLUMN
 from compd.configuration import Configuration
@@ -25,12 +26,52 @@ from compd.live.loop import (
     step,
 )
 from compd.live.machine import LiveModel, Models
-from compd.live.record.agreement import Agreement, agreement
 from compd.live.record.recording_part import CYCLES_SUFFIX, MODEL_MARK, ORDER
 from compd.live.record.table_rows import Message
 from compd.live.service import FORMER_TIP_NOISE, RecordedCycle, parse_readings
 from compd.recording import ARROW, OpenPart
 from compd.table_file import CSV, SUFFIXES, row_count
+
+# What another order of the same additions changes: nine last bits of a length of 500 mm.
+SAME_BY_ANOTHER_KERNEL_MM = 1e-12
+
+
+class Agreement(StrEnum):
+    """One of three. Each value is what `compd recording replay` says of it."""
+
+    SAME = "the same to the last bit"
+    ANOTHER_KERNEL = "within 1e-12 mm by another kernel"
+    DIFFERENT = "different"
+
+
+def agreement(sent: bytes, replayed: Setpoint, another_kernel: bool) -> Agreement:
+    """How far the line that was sent agrees with the setpoint that is computed now.
+
+    The line has rounded numbers. Each of them must be what a number within 1e-12 mm of the present one is rounded to,
+    where another kernel made it; all else is the same.
+
+    Parameters
+    ----------
+    another_kernel : whether the line was computed by other kernels, or by kernels that are not known.
+    """
+    if sent == replayed.to_json():
+        return Agreement.SAME
+    if not another_kernel:
+        return Agreement.DIFFERENT
+    low, high = (replayed.message(moved_mm) for moved_mm in (-SAME_BY_ANOTHER_KERNEL_MM, SAME_BY_ANOTHER_KERNEL_MM))
+    return Agreement.ANOTHER_KERNEL if _is_between(json.loads(sent), low, high) else Agreement.DIFFERENT
+
+
+def _is_between(sent: Any, low: Any, high: Any) -> bool:
+    """Whether every number is between those of the same place, and all else is the same."""
+    if isinstance(sent, dict) and isinstance(low, dict):
+        return sent.keys() == low.keys() and all(_is_between(sent[key], low[key], high[key]) for key in sent)
+    if isinstance(sent, list) and isinstance(low, list):
+        return len(sent) == len(low) and all(map(_is_between, sent, low, high))
+    if isinstance(sent, float) and isinstance(low, float):
+        return bool(low <= sent <= high)
+    return bool(isinstance(sent, bool) is isinstance(low, bool) and sent == low)
+
 
 # Of a part's messages the first two say who spoke, and what the columns are.
 _VERSION = "VERSION"

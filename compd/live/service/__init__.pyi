@@ -17,9 +17,9 @@ from .request_context import Errands as Errands
 from .request_context import Messages as Messages
 from .request_context import RequestContext as RequestContext
 from .request_context import TargetKeys as TargetKeys
+from .request_context import TcpAccess as TcpAccess
 from .requests import Requests as Requests
 from .state_json import FORMER_TIP_NOISE as FORMER_TIP_NOISE
 from .status_message import StatusReport as StatusReport
-from .tcp_access import TcpAccess as TcpAccess
 from .udp_sender import UdpSender as UdpSender
 from .zero_capture import ZeroCapture as ZeroCapture

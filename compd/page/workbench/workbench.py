@@ -2,21 +2,23 @@
 
 from __future__ import annotations
 
+import hashlib
+import json
 import shlex
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from compd.comparison import Comparison
 from compd.configuration import Machine
 from compd.diagnosis import Diagnosis, diagnose
 from compd.errors import CompdError, RecordingError, StateError
 from compd.files import file_stamp, write_files
 from compd.live.machine import ModelText
-from compd.model.effects import can_concern
+from compd.model.effects import Effect, can_concern
 from compd.model.library import beside_library
 from compd.page.recording_machine import machine_of
 from compd.page.workbench.candidates import Candidates
-from compd.page.workbench.drafts import Drafts
 from compd.page.workbench.effect_libraries import OWN_NAME
 from compd.page.workbench.effect_sources import EffectSources
 from compd.page.workbench.model_changes import proposed, step_summary, undone, write
@@ -25,6 +27,39 @@ from compd.page.workbench.own_effects import OwnEffects
 from compd.page.workbench.trial import Trial
 from compd.planning import MeasurementPlan
 from compd.recording import exclude_rows, include_rows
+
+# Most drafts: browsers that can write at once.
+MOST = 16
+_DIGITS = 12
+
+
+class Drafts:
+    """The newest drafts beside one comparison, each named after its content: `ram_growth@3f0c9b12a4d7`."""
+
+    def __init__(self, comparison: Comparison, library: Candidates) -> None:
+        """library : the known effects; a draft's fit has the same row weights."""
+        self._comparison, self._library = comparison, library
+        self._candidates: dict[str, Candidates] = {}
+
+    @property
+    def effects(self) -> dict[str, Effect]:
+        """The drafts by name."""
+        return {name: next(iter(candidates.library.values())) for name, candidates in self._candidates.items()}
+
+    def add(self, effect: Effect) -> str:
+        """Keep a draft, replacing the oldest beyond the limit; return its name."""
+        text = json.dumps(effect.declared, sort_keys=True)
+        name = f"{effect.id}@{hashlib.sha256(text.encode()).hexdigest()[:_DIGITS]}"
+        candidates = self._candidates.pop(name, None)
+        self._candidates[name] = candidates or Candidates(self._comparison, [effect], self._library.problem)
+        for oldest in list(self._candidates)[:-MOST]:
+            del self._candidates[oldest]
+        return name
+
+    def find(self, name: str) -> tuple[Candidates, str]:
+        """The candidates that contain an effect, and its id there: a draft, or any other effect of that name."""
+        candidates = self._candidates.get(name)
+        return (self._library, name) if candidates is None else (candidates, name.partition("@")[0])
 
 
 class CommandLines(NamedTuple):

@@ -13,7 +13,7 @@ from typer.testing import CliRunner
 
 import compd.configuration.line_checks
 from compd.cli.app import app
-from compd.commissioning.pushed_periods import period_warnings
+from compd.commissioning.jump_trials import period_warnings
 from compd.configuration import Configuration, load
 from compd.documents import read_document
 from compd.errors import ConfigurationError

@@ -11,7 +11,7 @@ import pytest
 from compd.arrays import FloatArray
 from compd.comparison.alignment.aligned_recording import AlignedRecording
 from compd.comparison.effect_fit import fit, initial_effect
-from compd.comparison.initial_states import initial_state_columns
+from compd.comparison.nuisance import initial_state_columns
 from compd.comparison.recording_comparison import compare
 from compd.comparison.shape_search import search_constants
 from compd.model.library import find_effect

@@ -35,7 +35,7 @@ from compd.live.record import RecordedCycles
 from compd.live.record.replay import CYCLES_SUFFIX
 from compd.live.service import LastReadings
 from compd.live.service.last_readings import FILE_NAME as LAST_NAME
-from compd.live.service.tcp_access import read_token
+from compd.live.service.request_context import read_token
 from compd.model.library import load_effects
 from compd.model_file import read_stored
 from compd.model_file.model_document import read_document as read_model_document

@@ -18,8 +18,8 @@ from compd.errors import ConfigurationError
 from compd.gauge import Gauge
 from compd.gauge_tools.open_gauge import line_settings
 from compd.lines.line_definition import PolledDefinition, PushedDefinition
+from compd.lines.open import KINDS, definition_of, kinds_that_carry
 from compd.lines.port_arguments import PortArguments
-from compd.lines.registry import KINDS, definition_of, kinds_that_carry
 from compd.plugins import GAUGES, load, names
 from docs.generate import configuration as configuration_page
 from docs.generate import gauges as gauges_page
@@ -75,7 +75,7 @@ def test_a_library_that_a_kind_needs_is_an_extra() -> None:
 def test_the_registry_loads_neither_a_library_nor_a_twin() -> None:
     """A daemon with serial lines alone must not wait for asyncua; `compd check` of such a machine neither."""
     heavy = ("asyncua", "paho", "pymodbus", "serial", "compd.twins", "compd.probes", "compd.lines.stream")
-    code = f"import compd.lines.registry, sys; print([name for name in {heavy} if name in sys.modules])"
+    code = f"import compd.lines.open, sys; print([name for name in {heavy} if name in sys.modules])"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=ROOT)
     assert done.stdout.strip() == "[]"
 

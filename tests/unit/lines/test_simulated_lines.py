@@ -11,8 +11,8 @@ import pytest
 from compd.clock import MonotonicClock
 from compd.gauge import LineFault, Quality
 from compd.lines.line_definition import PolledDefinition
+from compd.lines.open import KINDS
 from compd.lines.port_arguments import PortArguments
-from compd.lines.registry import KINDS
 from compd.simulation.wires.simulated_line import SimulatedLine
 from compd.twins import SimulatedByteDevice
 from tests.support.wire_rig import SETTINGS, outcome, rig

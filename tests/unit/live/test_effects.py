@@ -18,8 +18,7 @@ from compd.live import daemon as daemon_module
 from compd.live.daemon import Daemon
 from compd.live.loop.commands import Target
 from compd.live.loop.cycle import step
-from compd.live.loop.directions import Directions
-from compd.live.loop.ring_entries import CyclePacker, CycleUnpacker
+from compd.live.loop.ring_entries import CyclePacker, CycleUnpacker, Directions
 from compd.live.machine.model_loader import Models
 from compd.live.service.readings_message import ReadingsMessage, parse_readings
 from compd.setpoint_states import State

@@ -17,9 +17,8 @@ from compd.live.loop import Target
 from compd.live.loop.limits import limit_pose_correction
 from compd.live.loop.packet_layout import BODY, PACKET_BODY
 from compd.live.machine import Models
-from compd.live.record.agreement import Agreement
 from compd.live.record.compared_table import differing_cells
-from compd.live.record.replay import RecordedCycles, replay_cycles
+from compd.live.record.replay import Agreement, RecordedCycles, replay_cycles
 from compd.machine_check import load_whole
 from compd.operation_settings import LimitSettings
 from compd.setpoint_states import State

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from compd.gauge import Quality, good
+from compd.live.acquisition.cross_checks.cross_checks import StandingTemperature
 from compd.live.acquisition.cross_checks.machine_view import MachineView
-from compd.live.acquisition.cross_checks.standing_temperature import StandingTemperature
 from compd.live.acquisition.quantity_bounds import quantity_limits
 from compd.live.acquisition.quantity_trust import QuantityTrust
 from compd.live.memory.trust_memory import Doubt, TrustMemory

@@ -18,9 +18,8 @@ from compd.errors import RecordingError, StateError
 from compd.kernel_versions import versions_text_here
 from compd.live.loop.cycle import step
 from compd.live.machine.model_loader import Models
-from compd.live.record.agreement import Agreement
 from compd.live.record.compared_table import differing_cells
-from compd.live.record.replay import RecordedCycles, replay_cycles
+from compd.live.record.replay import Agreement, RecordedCycles, replay_cycles
 from compd.live.service.readings_message import parse_readings
 from compd.live.service.state_json import from_plain, to_plain
 from compd.model import EffectMemory

@@ -7,7 +7,7 @@ import random
 
 import pytest
 
-from compd.page.event_history import Moments
+from compd.page.broadcast import Moments
 
 
 def noted(seconds, step_s=0.1):

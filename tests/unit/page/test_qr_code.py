@@ -7,7 +7,7 @@ import sys
 
 import pytest
 
-from compd.page.qr_code import print_qr_code, svg_qr_code
+from compd.page.server import print_qr_code, svg_qr_code
 from compd.page.token_file import read_tokens
 from tests.support.command import run_in_process
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from compd.recording.kept_rows import DOUBLED, NO_TIME, kept_rows
+from compd.recording.recording_builder import DOUBLED, NO_TIME, kept_rows
 
 
 def table(at_rest: int, moving: int) -> dict[str, np.ndarray]:

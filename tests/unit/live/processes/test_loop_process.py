@@ -9,8 +9,7 @@ import pytest
 from compd.clock import MonotonicClock
 from compd.gauge import Quality
 from compd.live.loop.adopted_models import AdoptedModels
-from compd.live.loop.directions import Directions
-from compd.live.loop.ring_entries import CyclePacker
+from compd.live.loop.ring_entries import CyclePacker, Directions
 from compd.live.loop.timing import LoopTiming
 from compd.live.machine.model_loader import Models, ModelText
 from compd.live.memory.control import Control

@@ -11,7 +11,7 @@ import structlog
 from compd.client import connect
 from compd.errors import DaemonError
 from compd.live.service import connection_limits as seats
-from compd.live.service.tcp_access import TcpAccess
+from compd.live.service.request_context import TcpAccess
 from compd.operation_settings import TcpSocket
 from tests.support.service import VERSION, Service
 
