@@ -4,10 +4,15 @@ from .effect_files import listed_code as listed_code
 from .external_geometry import EXTERNAL as EXTERNAL
 from .external_geometry import ExternalGeometry as ExternalGeometry
 from .external_geometry import external_of as external_of
+from .geometry import COORDINATES as COORDINATES
 from .geometry import LINKS as LINKS
+from .geometry import Actuator as Actuator
 from .geometry import Geometry as Geometry
+from .geometry import MechanismDescription as MechanismDescription
+from .geometry import SlidingActuator as SlidingActuator
 from .geometry import ToolOnPlateSettings as ToolOnPlateSettings
 from .geometry import ToolOnPlatformSettings as ToolOnPlatformSettings
+from .geometry import TurningActuator as TurningActuator
 from .machine_configuration import SECTIONS as SECTIONS
 from .machine_configuration import Configuration as Configuration
 from .machine_configuration import Examined as Examined
@@ -15,11 +20,6 @@ from .machine_configuration import examine as examine
 from .machine_configuration import gauges_of as gauges_of
 from .machine_configuration import in_order as in_order
 from .machine_configuration import load as load
-from .mechanism import COORDINATES as COORDINATES
-from .mechanism import Actuator as Actuator
-from .mechanism import MechanismDescription as MechanismDescription
-from .mechanism import SlidingActuator as SlidingActuator
-from .mechanism import TurningActuator as TurningActuator
 from .places import place_problems as place_problems
 from .places import place_warnings as place_warnings
 from .schema import json_schema as json_schema

@@ -5,5 +5,5 @@ from .capture import capture_live as capture_live
 from .capture import read_capture as read_capture
 from .capture import saved_capture as saved_capture
 from .describe import learn_gauge as learn_gauge
-from .read_back import rounds as rounds
+from .describe import rounds as rounds
 from .reply_columns import DescriptionError as DescriptionError

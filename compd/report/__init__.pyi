@@ -1,10 +1,10 @@
 from .axis_colours import AXES_CSS as AXES_CSS
 from .axis_colours import AXIS_COLOURS as AXIS_COLOURS
 from .calibration_page import write_calibration_page as write_calibration_page
+from .comparison_page import name_of as name_of
+from .comparison_page import no_trend_text as no_trend_text
+from .comparison_page import summary as summary
 from .comparison_page import write_comparison_page as write_comparison_page
-from .comparison_table import name_of as name_of
-from .comparison_table import no_trend_text as no_trend_text
-from .comparison_table import summary as summary
 from .diagnosis_page import write_diagnosis_page as write_diagnosis_page
 from .diagnosis_text import keep_words_whole as keep_words_whole
 from .diagnosis_text import print_diagnosis as print_diagnosis

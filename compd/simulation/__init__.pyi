@@ -1,6 +1,6 @@
 from .campaign.plan_reader import read_plan as read_plan
 from .campaign.simulate_campaign import simulate_campaign as simulate_campaign
-from .campaign.sizing import CauseSizer as CauseSizer
+from .campaign.simulated_recording import CauseSizer as CauseSizer
 from .causes.catalogue import build_cause as build_cause
 from .causes.hidden_cause import SizedCause as SizedCause
 from .causes.hidden_cause import draw_hidden as draw_hidden

@@ -21,8 +21,7 @@ from compd.simulation import simulate_campaign
 from compd.simulation.campaign.campaign import Campaign, steady_speed_mm_per_s
 from compd.simulation.campaign.campaign_plan import GAP_S, SESSIONS, draw_campaign_plan
 from compd.simulation.campaign.row_log import LoggedRows
-from compd.simulation.campaign.simulated_recording import SimulatedRecording, simulate_recording
-from compd.simulation.campaign.sizing import CauseSizer
+from compd.simulation.campaign.simulated_recording import CauseSizer, SimulatedRecording, simulate_recording
 from compd.simulation.causes.catalogue import CAUSES, build_cause, possible_causes
 from compd.simulation.causes.hidden_cause import MAX_FLOORS, MIN_FLOORS, HiddenCause, draw_hidden, parse_hidden
 from compd.simulation.truth.instruments import BALLS, TRACKER, TRACKER_SIGMA_UM, ball_plate_mm

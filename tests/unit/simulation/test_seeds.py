@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from compd.configuration import load
-from compd.simulation.campaign import sizing
+from compd.simulation.campaign import simulated_recording
 from compd.simulation.campaign.simulated_recording import SimulatedRecording, simulate_recording
 from compd.simulation.causes import catalogue, hidden_cause
 from compd.simulation.causes.catalogue import CAUSES, build_cause, possible_causes, shuffle_causes
@@ -32,7 +32,7 @@ class AddedCause(LinkZero):
 def add_cause(monkeypatch: pytest.MonkeyPatch) -> None:
     """Put the added cause before all others, so that every place in the list changes."""
     causes = {AddedCause.id: AddedCause, **CAUSES}
-    for module in (catalogue, hidden_cause, sizing, scoreboard_draws):
+    for module in (catalogue, hidden_cause, simulated_recording, scoreboard_draws):
         monkeypatch.setattr(module, "CAUSES", causes)
     assert next(iter(possible_causes(MACHINES[0]))) == AddedCause.id
 

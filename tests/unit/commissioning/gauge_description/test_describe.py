@@ -10,8 +10,7 @@ import pytest
 from compd.errors import CompdError
 from compd.gauge_description import Answers, learn_gauge
 from compd.gauge_description.capture import CapturedReply
-from compd.gauge_description.describe import describe_replies
-from compd.gauge_description.read_back import read_back
+from compd.gauge_description.describe import describe_replies, read_back
 from compd.plugins import GAUGES, load
 from compd_drivers.serial_ascii import SerialAscii
 
