@@ -18,15 +18,15 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 def main() -> None:
     """Entry point of `compd`: prints all of a person's mistakes, with exit code 2."""
     from compd.cli.loading import loading
+    from compd.errors import CompdError
 
-    with loading():
-        from compd.cli.commands import make_app
-        from compd.cli.old_names import renamed
-        from compd.errors import CompdError
-
-        sys.argv[1:] = renamed(sys.argv[1:])
-        app = make_app(*sys.argv[1:3])
     try:
+        with loading():
+            from compd.cli.commands import make_app
+            from compd.cli.old_names import renamed
+
+            sys.argv[1:] = renamed(sys.argv[1:])
+            app = make_app(*sys.argv[1:3])
         app()
     except CompdError as error:
         _refuse(error.problems)

@@ -6,6 +6,7 @@ import sys
 from typing import Any
 
 from compd.cli.options import DEFAULT_SOCKET
+from compd.errors import CompdError
 
 OLD_NAMES = {
     "check --drivers": "gauge list",
@@ -28,6 +29,8 @@ OLD_NAMES = {
     "fault": "sim fault",
     "tracker": "sim tracker",
 }
+# What is a script of a checkout now.
+SCRIPTS = {"paper": "examples/paper/reproduce.py", "demo --linuxcnc": "examples/linuxcnc/run.py"}
 # Commands that had the daemon's address as their argument.
 _ADDRESSED = ("page", "status", "watch", "zero")
 
@@ -36,6 +39,8 @@ def renamed(words: list[str]) -> list[str]:
     """The words of a command line with the command's present name, of which one line on standard error tells."""
     for count in (2, 1):
         old = " ".join(words[:count])
+        if script := SCRIPTS.get(old):
+            raise CompdError.of(f"compd {old}", "is a script now", next_step=f"run {script} of a checkout")
         if new := OLD_NAMES.get(old):
             _tell(old, new)
             return [*new.split(), *words[count:]]

@@ -9,8 +9,6 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from compd.errors import CompdError
-
 if TYPE_CHECKING:
     from compd.demo import DemoSession
 
@@ -26,11 +24,8 @@ def demo(
     port: Annotated[
         int, typer.Option(min=0, max=65535, help="With --live: TCP port of the page; 0: any free port.")
     ] = 7760,
-    linuxcnc: Annotated[bool, typer.Option("--linuxcnc", help="Now a script: examples/linuxcnc/run.py.")] = False,
 ) -> None:
     """Run a simulated machine, the daemon and a controller; show the gain by compensation."""
-    if linuxcnc:
-        raise CompdError.of("--linuxcnc", "is a script", next_step="run examples/linuxcnc/run.py of a checkout")
     if live:
         _show_live(config, seed, port)
         return

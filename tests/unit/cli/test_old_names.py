@@ -11,9 +11,10 @@ from typer.testing import CliRunner
 
 from compd.cli.app import app
 from compd.cli.commands import make_app
-from compd.cli.old_names import OLD_NAMES, renamed
+from compd.cli.old_names import OLD_NAMES, SCRIPTS, renamed
 from compd.release import __version__
 from docs.generate.command_entries import entries
+from tests.support.paths import ROOT
 
 
 @pytest.mark.parametrize("old", OLD_NAMES)
@@ -39,6 +40,15 @@ def test_an_old_name_changes_neither_what_is_printed_nor_the_exit_code(tmp_path:
     assert new[0] == 2
     assert old == (*new[:2], f"`compd fault` is now `compd sim fault`; {GOES}\n{new[2]}")
     assert printed("effect", "show", "link_sag")[:2] == printed("model", "effect", "link_sag")[:2]
+
+
+@pytest.mark.parametrize("old", SCRIPTS)
+def test_what_is_a_script_now_says_which(old: str) -> None:
+    done = subprocess.run([sys.executable, "-m", "compd", *old.split()], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert f"compd {old}: is a script now" in done.stderr
+    assert f"run {SCRIPTS[old]} of a checkout" in done.stderr
+    assert (ROOT / SCRIPTS[old]).is_file()
 
 
 @pytest.mark.parametrize("words", [["sim", "run", "x"], ["gauge", "poll"], ["--version"], [], ["zeroo", "record"]])
