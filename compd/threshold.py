@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import inspect
 from dataclasses import fields, is_dataclass, replace
+from functools import cache
 from itertools import pairwise
 from textwrap import dedent
 from typing import Any, NamedTuple, TypeVar
@@ -33,6 +34,7 @@ def thresholds(kind: type[Any]) -> dict[str, Threshold]:
     return found
 
 
+@cache
 def _texts(kind: type[Any]) -> dict[str, str]:
     """The string under each field, in the source of the class."""
     declared = ast.parse(dedent(inspect.getsource(kind))).body[0]

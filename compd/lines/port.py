@@ -182,10 +182,13 @@ class SerialPort:
             raise LineFault(Quality.LINE_LOST, f"no break on this port: {error}") from error
 
     def close(self) -> None:
+        connection = getattr(self._port, "_socket", None)
         try:
             self._port.close()
         except PORT_FAULTS as error:
             log.info("a lost port did not close cleanly", reason=str(error))
+        if connection is not None:  # pyserial leaves it open where the other end has gone
+            connection.close()
 
 
 class TcpPort:

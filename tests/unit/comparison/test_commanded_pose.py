@@ -72,7 +72,8 @@ def test_the_drives_are_those_of_the_drawing(tmp_path: Path, kind: str) -> None:
     tips_mm[2, ~np.array(unfixed)] = 1e5
     tips_mm[4] = np.nan
     lost = np.isnan(scales_of_command(model, tips_mm, turns_rad)).all(axis=1)
-    assert lost.tolist() == [False, False, True, False, True, False], "out of reach, not given"
+    # links of a 3-RPS as long as that have their lengths
+    assert lost.tolist() == [False, False, kind != "3-rps", False, True, False], "out of reach, not given"
 
 
 def test_a_campaign_is_compared_and_its_cause_found(tmp_path: Path) -> None:
