@@ -114,26 +114,23 @@ def _origin_at(tip_M: FloatArray, R: FloatArray, tip_P: FloatArray, origin_M: Fl
 
 
 @helper
-def _free_step(
-    J: FloatArray, by_actuator: FloatArray, fixed: IntArray, first: int, M: FloatArray, pivot: IntArray, x: FloatArray
-) -> float:
-    """Solve the rows from `first` on for the free coordinates and, where that is 0, the actuators.
+def _free_step(J: FloatArray, fixed: IntArray, M: FloatArray, pivot: IntArray, x: FloatArray) -> float:
+    """Solve the last rows for the free coordinates and, where M has all rows, for the actuators.
 
-    x (6,) : in place, the step by the coordinates, and then by the actuators.  Returns the determinant's sign.
+    M : (size, size), that has the derivatives by the actuators behind.  x (6,) : the rows, in place the step by the
+    coordinates, and then by the actuators.  Returns the determinant's sign.
     """
-    size, column = 6 - first, 0
+    first, column = 6 - M.shape[0], 0
+    for i in range(6):
+        x[i] = -x[first + i] if first + i < 6 else 0.0
     for c in range(6):
         if fixed[c] == 0:
-            for i in range(size):
+            for i in range(M.shape[0]):
                 M[i, column] = J[first + i, c]
             column += 1
-    for i in range(size):
-        x[i] = x[first + i]
-        for a in range(size - column):
-            M[i, column + a] = by_actuator[i, a]
-    sign = lu_factor(M[:size, :size], pivot)
+    sign = lu_factor(M, pivot)
     if sign != 0.0:
-        lu_solve(M[:size, :size], pivot, x[:size])
+        lu_solve(M, pivot, x)
     return sign
 
 
@@ -147,38 +144,21 @@ def _move_freely(
     actuator_mm: FloatArray,
     moved: FloatArray,
 ) -> float:
-    """Take the step x of `_free_step`, a long one shortened; returns its length.  moved (6,) : room."""
+    """Take the step x of `_free_step`, a long one shortened; returns its length.  moved (1, 6) : room."""
     step = max_abs(x)
     share = STEP_LIMIT * size_mm / max(step, STEP_LIMIT * size_mm)
     column = 0
     for c in range(6):
-        moved[c] = 0.0
+        moved[0, c] = 0.0
         if fixed[c] == 0:
-            moved[c] = share * x[column]
+            moved[0, c] = share * x[column]
             column += 1
-    place += moved[:3]
-    rotate_in_place(R, moved[3] / size_mm, moved[4] / size_mm, moved[5] / size_mm)
-    for i in range(column, x.shape[0]):
+    for c in range(3):
+        place[c] += moved[0, c]
+    rotate_in_place(R, moved[0, 3] / size_mm, moved[0, 4] / size_mm, moved[0, 5] / size_mm)
+    for i in range(column, 6):
         actuator_mm[i - column] += share * x[i]
     return step
-
-
-@helper
-def _check_solution(
-    J: FloatArray,
-    room: FloatArray,
-    pivot: IntArray,
-    residual_mm: float,
-    same_sign: bool,
-    R: FloatArray,
-    attitude_R: FloatArray,
-) -> int:
-    """The reason of a pose that Newton's method ended at; J and room (6, 6) are overwritten."""
-    if residual_mm > RESIDUAL_TOLERANCE_MM:
-        return NO_CONVERGENCE
-    if lu_factor(J, pivot) == 0.0 or inverse_norm(J, room) > AMPLIFICATION_LIMIT:
-        return NEAR_SINGULAR
-    return OK if same_sign and not is_turned_over(R, attitude_R) else OTHER_ASSEMBLY
 
 
 @helper
@@ -218,56 +198,57 @@ def solve_inverse(
 ) -> None:
     """See `compd.model.kinematics.actuators.inverse_kinematics`."""
     n, m = actuator_of_link.shape[0], kinds.shape[0]
-    actuator_mm[:] = guess_mm
+    extends_each = n == m
+    for a in range(m):
+        actuator_mm[a] = guess_mm[a]
+        extends_each &= kinds[a] == EXTENDS
     R[:, :] = attitude_R
     iterations[0], residual_mm[0] = 0, math.nan
     size_mm = platform_radius(platform_joints_P)
-    place = tip_M.copy()
-    value, pivot = np.empty(6), np.empty(6, np.int64)
-    J, M, by_actuator = np.empty((6, 6)), np.empty((6, 6)), np.empty((6, m))
+    place, value, pivot = tip_M.copy(), np.empty(6), np.empty(6, np.int64)
+    J, size = np.empty((6, 6)), 6 - n if extends_each else 6
+    M = np.empty((size, size))
     finite = pose_is_finite(base_joints_M, platform_joints_P, revolute_axes, tip_M, R)
     finite &= all_finite(tip_P) and all_finite(guess_mm) and all_finite(rod_length_mm)
     reason[0] = (OK if size_mm > 0.0 else NEAR_SINGULAR) if finite else NOT_FINITE
-    extends_each = n == m and not kinds.any()
-    step, sign, first_sign = 0.0 if extends_each and n == 6 else math.inf, 0.0, 0.0
+    step, sign, first_sign = math.inf if size > 0 else 0.0, 0.0, 0.0
     while reason[0] == OK:
         _origin_at(place, R, tip_P, origin_M)
-        place_links(
-            kinds, cosine_M, sine_M, radius_mm, actuator_of_link, base_joints_M, rod_length_mm, actuator_mm,
-            joints_M, lengths_mm,
-        )  # fmt: skip
+        if iterations[0] == 0 or not extends_each:
+            place_links(
+                kinds, cosine_M, sine_M, radius_mm, actuator_of_link, base_joints_M, rod_length_mm, actuator_mm,
+                joints_M, lengths_mm,
+            )  # fmt: skip
         if not evaluate_closure(origin_M, R, joints_M, platform_joints_P, revolute_axes, hinges, size_mm, value, J):
             reason[0] = UNREACHABLE
             break
-        if extends_each:
-            lengths_mm[:] = value[:n]
-            extend(actuator_of_link, rod_length_mm, lengths_mm, actuator_mm)
-        value[:n] -= lengths_mm
+        for i in range(n):
+            lengths_mm[i] = value[i] if extends_each else lengths_mm[i]
+            value[i] -= lengths_mm[i]
         if step <= STEP_TOLERANCE_MM:
             break
-        if iterations[0] == ITERATION_LIMIT:
-            reason[0] = NO_CONVERGENCE
-            break
         if not extends_each:
+            free = 6 - m
             closure_by_actuators(
-                kinds, cosine_M, sine_M, radius_mm, actuator_of_link, hinges, actuator_mm, J, by_actuator
+                kinds, cosine_M, sine_M, radius_mm, actuator_of_link, hinges, actuator_mm, J, M[:, free:]
             )
         _rows_by_tip(J, R, tip_P, size_mm)
-        value[:] = -value
-        first = n if extends_each else 0
-        sign = _free_step(J, by_actuator, fixed, first, M, pivot, value)
-        if sign == 0.0:
-            reason[0] = NEAR_SINGULAR
-            break
-        if iterations[0] == 0:
-            first_sign = sign
-        step = _move_freely(fixed, value[: 6 - first], size_mm, place, R, actuator_mm, M[0])
+        sign = _free_step(J, fixed, M, pivot, value)
+        first_sign = sign if iterations[0] == 0 else first_sign
+        step = _move_freely(fixed, value, size_mm, place, R, actuator_mm, J)
         iterations[0] += 1
+        if sign == 0.0 or (iterations[0] == ITERATION_LIMIT and step > STEP_TOLERANCE_MM):
+            reason[0] = NEAR_SINGULAR if sign == 0.0 else NO_CONVERGENCE
     if reason[0] == OK:
+        if extends_each:
+            extend(actuator_of_link, rod_length_mm, lengths_mm, actuator_mm)
         if iterations[0] > 0:
             orthonormalise(R)
         residual_mm[0] = max_abs(value)
-        reason[0] = _check_solution(J, M, pivot, residual_mm[0], sign == first_sign, R, attitude_R)
+        held = lu_factor(J, pivot) != 0.0 and inverse_norm(J, np.empty((6, 6))) <= AMPLIFICATION_LIMIT
+        same = sign == first_sign and not is_turned_over(R, attitude_R)
+        reason[0] = (OK if same else OTHER_ASSEMBLY) if held else NEAR_SINGULAR
+        reason[0] = reason[0] if residual_mm[0] <= RESIDUAL_TOLERANCE_MM else NO_CONVERGENCE
     if reason[0] != OK:
         origin_M[:] = actuator_mm[:] = lengths_mm[:] = math.nan
         R[:, :] = joints_M[:, :] = math.nan

@@ -27,10 +27,10 @@ def stand_on(model: Any, rotation_M_B: FloatArray, base_joints_M_mm: FloatArray,
 @helper
 def stand_parts(model: Any, rotation_M_B: FloatArray, base_joints_M_mm: FloatArray, machine: Any) -> None:
     """As `stand_on`, with what is added to the lengths as it was."""
-    machine.base_joints_M_mm[:, :] = base_joints_M_mm
-    machine.platform_joints_P_mm[:, :] = model.platform_joints_P_mm
-    machine.revolute_axes_P[:, :] = model.revolute_axes_P
-    machine.tool_mm[:] = model.tool_mm
+    machine.base_joints_M_mm = base_joints_M_mm
+    machine.platform_joints_P_mm = model.platform_joints_P_mm
+    machine.revolute_axes_P = model.revolute_axes_P
+    machine.tool_mm = model.tool_mm
     for a in range(model.scales):
         if model.kinds[a] != EXTENDS:
             turn_with_base(model, rotation_M_B, model.cosine_M[a], machine.cosine_M[a])
@@ -116,7 +116,7 @@ def inverse_standing(
     same_pose : `pose` reaches this target on a machine that differs in nothing but its links' lengths.
     """
     n, m, k = model.links, model.scales, model.axes
-    rod_length_mm = np.empty(n)
+    rod_length_mm = machine.rod_length_mm[:n]
     for i in range(n):
         rod_length_mm[i] = model.rod_length_mm[i] + machine.reading_to_length_mm[i] - machine.joint_shortening_mm[i]
     if same_pose and model.extends_each:

@@ -110,7 +110,8 @@ SOLVED_POSE = np.dtype(
 )
 
 # The machine between gauges and platform, of `compd.model.prediction.PerturbedMachine`: base joints with the actuators
-# at 0, cosine_M and sine_M where the base has turned them; scale_mm: what is added to the scales' readings.
+# at 0, cosine_M and sine_M where the base has turned them; scale_mm: what is added to the scales' readings;
+# rod_length_mm: with what is added to the links.
 SOLVED_MACHINE = np.dtype(
     [
         ("cosine_M", *_POINTS),
@@ -122,6 +123,7 @@ SOLVED_MACHINE = np.dtype(
         ("tool_mm", *_VECTOR),
         ("joint_shortening_mm", *_LENGTHS),
         ("reading_to_length_mm", *_LENGTHS),
+        ("rod_length_mm", *_LENGTHS),
         ("joint_reason", np.int64, (1,)),
     ]
 )
