@@ -11,6 +11,7 @@ import numpy as np
 from compd.arrays import FloatArray
 from compd.jit import ROW_MATRICES, ROWS, helper, loop
 from compd.model.kernels.effects_on_machine import add_effect, add_effects, set_row
+from compd.model.kernels.inverse_solver import inverse_standing
 from compd.model.kernels.joints import shorten_by_joints
 from compd.model.kernels.machine_solver import (
     copy_frame,
@@ -39,7 +40,7 @@ from compd.model.kernels.row_arguments import (
     WantedRows,
     WarmRows,
 )
-from compd.model.kernels.standing_machine import forward_standing, inverse_standing, stand_on
+from compd.model.kernels.standing_machine import forward_standing, stand_on
 from compd.model.structures import GIVEN, MODELS
 from compd.rotation import to_inner_frame
 

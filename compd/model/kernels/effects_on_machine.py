@@ -13,11 +13,12 @@ import numpy as np
 from compd.arrays import FloatArray
 from compd.jit import helper
 from compd.model.kernels.effect_dispatch import set_basis
+from compd.model.kernels.inverse_solver import inverse_standing
 from compd.model.kernels.joints import shorten_by_joints
 from compd.model.kernels.machine_solver import copy_frame, copy_pose, frame_change_mm, solve_frame
 from compd.model.kernels.reason_codes import OK
 from compd.model.kernels.row_arguments import EffectArrays
-from compd.model.kernels.standing_machine import inverse_standing, stand_parts
+from compd.model.kernels.standing_machine import stand_parts
 from compd.model.structures import FRAME, LENGTHS
 from compd.rotation import to_outer_frame
 
@@ -164,7 +165,6 @@ def add_effects(
     """
     m = model.scales
     total_mm = np.zeros(added_mm.shape[1])
-    tip_M_mm, tip_P_mm = np.empty(3), np.empty(3)
     level = LENGTHS
     reason = OK
     copy_frame(result.bare_frame, result.frame)
@@ -178,8 +178,8 @@ def add_effects(
             continue
         altered = work.altered
         _add_to_machine(model, total_mm, level, joint_mm, frame_mm, result.bare_frame, result.frame, altered)
-        tip_M_mm[:] = altered.tool_mm if model.tool_on_plate else result.target_M_mm
-        tip_P_mm[:] = result.target_P_mm if model.tool_on_plate else altered.tool_mm
+        tip_M_mm = altered.tool_mm if model.tool_on_plate else result.target_M_mm
+        tip_P_mm = result.target_P_mm if model.tool_on_plate else altered.tool_mm
         work.with_effects.actuator_mm = work.command.actuator_mm
         attitude_M_P = work.nominal.rotation_M_P
         inverse_standing(model, altered, tip_M_mm, tip_P_mm, attitude_M_P, level == LENGTHS, work.with_effects)
