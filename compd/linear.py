@@ -33,6 +33,16 @@ def all_finite(x: FloatArray) -> bool:
 
 
 @helper
+def rows_finite(x: FloatArray) -> bool:
+    """Every entry of x (n, m) is finite."""
+    result = True
+    for i in range(x.shape[0]):
+        for j in range(x.shape[1]):
+            result = result and is_finite(x[i, j])
+    return result
+
+
+@helper
 def max_abs(x: FloatArray) -> float:
     """Greatest absolute value in x (n,); nan if any entry is."""
     result = 0.0

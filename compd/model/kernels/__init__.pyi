@@ -1,11 +1,11 @@
 from . import formula as formula
-from .actuated_links import inverse as inverse
 from .actuated_links import placed_links as placed_links
 from .compensation import compensate_rows as compensate_rows
 from .effect_dispatch import FORMULA as FORMULA
 from .effect_dispatch import kernel_number as kernel_number
 from .effect_rows import basis_of_rows as basis_of_rows
 from .forward_solver import forward as forward
+from .inverse_solver import inverse as inverse
 from .joints import joint_shortening as joint_shortening
 from .link_forces import forces as forces
 from .loop_closure import closure as closure

@@ -1,4 +1,4 @@
-"""Actuators that extend links or move base joints, and the inverse kinematics of a machine with them.
+"""Actuators that extend links or move base joints.
 
 With q the place of an actuator in mm and u, v unit vectors in {M}, the base joint and the length of its links are
 
@@ -6,30 +6,16 @@ With q the place of an actuator in mm and u, v unit vectors in {M}, the base joi
     SLIDES     a = a0 + q u,                                      l = l0
     TURNS      a = a0 + radius (cos(q/radius) u + sin(q/radius) v),   l = l0
 
-(q of a turning actuator is the arc, radius times the angle). The inverse solves the closure for the m actuators and the
-6 - m coordinates of the platform that the target leaves free, by Newton's method: six equations for six unknowns. Where
-each link has an actuator of its own that extends it, the actuators follow from each pose: a hexapod takes no step.
+(q of a turning actuator is the arc, radius times the angle).
 """
 
 from __future__ import annotations
 
 import math
-
-import numpy as np
+from typing import Any
 
 from compd.arrays import FloatArray, IntArray
-from compd.jit import INTEGER_ROWS, INTEGERS, MATRIX, VECTOR, helper, kernel
-from compd.linear import all_finite, inverse_norm, lu_factor, lu_solve, max_abs
-from compd.model.kernels.loop_closure import evaluate_closure, is_turned_over, platform_radius, pose_is_finite
-from compd.model.kernels.reason_codes import NEAR_SINGULAR, NO_CONVERGENCE, NOT_FINITE, OK, OTHER_ASSEMBLY, UNREACHABLE
-from compd.model.kernels.solve_status import (
-    AMPLIFICATION_LIMIT,
-    ITERATION_LIMIT,
-    RESIDUAL_TOLERANCE_MM,
-    STEP_LIMIT,
-    STEP_TOLERANCE_MM,
-)
-from compd.rotation import orthonormalise, rotate_in_place
+from compd.jit import INTEGERS, MATRIX, VECTOR, helper, kernel
 
 EXTENDS, SLIDES, TURNS = range(3)
 
@@ -66,220 +52,25 @@ def place_links(
 
 @helper
 def closure_by_actuators(
-    kinds: IntArray,
-    cosine_M: FloatArray,
-    sine_M: FloatArray,
-    radius_mm: FloatArray,
-    actuator_of_link: IntArray,
-    hinges: IntArray,
-    actuator_mm: FloatArray,
-    J: FloatArray,
-    by_actuator: FloatArray,
+    model: Any, machine: Any, actuator_mm: FloatArray, J: FloatArray, by_actuator: FloatArray
 ) -> None:
     """Derivatives (6, m) of the closure's rows, |d_i| - l_i and the offsets of the hinges, by the actuators.
 
     J : (6, 6) of `evaluate_closure`; its first three columns are the rows' directions.
     """
-    n = actuator_of_link.shape[0]
+    n, kinds, radius_mm = model.links, model.kinds, model.radius_mm
     by_actuator[:, :] = 0.0
     for row in range(6):
-        a = actuator_of_link[row] if row < n else actuator_of_link[hinges[row - n, 0]]
+        a = model.of_link[row if row < n else model.hinges[row - n, 0]]
         if kinds[a] == EXTENDS:
             by_actuator[row, a] = -1.0 if row < n else 0.0
             continue
         angle = actuator_mm[a] / radius_mm[a] if kinds[a] == TURNS else 0.0
         for j in range(3):
-            along = cosine_M[a, j]
+            along = machine.cosine_M[a, j]
             if kinds[a] == TURNS:
-                along = math.cos(angle) * sine_M[a, j] - math.sin(angle) * cosine_M[a, j]
+                along = math.cos(angle) * machine.sine_M[a, j] - math.sin(angle) * machine.cosine_M[a, j]
             by_actuator[row, a] -= J[row, j] * along
-
-
-@helper
-def _rows_by_tip(J: FloatArray, R: FloatArray, tip_P: FloatArray, radius_mm: float) -> None:
-    """J (6, 6) by the displacement of the tip and the rotation about it, in place of those of the origin of {P}."""
-    rx = (R[0, 0] * tip_P[0] + R[0, 1] * tip_P[1] + R[0, 2] * tip_P[2]) / radius_mm
-    ry = (R[1, 0] * tip_P[0] + R[1, 1] * tip_P[1] + R[1, 2] * tip_P[2]) / radius_mm
-    rz = (R[2, 0] * tip_P[0] + R[2, 1] * tip_P[1] + R[2, 2] * tip_P[2]) / radius_mm
-    for i in range(6):
-        J[i, 3] -= ry * J[i, 2] - rz * J[i, 1]
-        J[i, 4] -= rz * J[i, 0] - rx * J[i, 2]
-        J[i, 5] -= rx * J[i, 1] - ry * J[i, 0]
-
-
-@helper
-def _origin_at(tip_M: FloatArray, R: FloatArray, tip_P: FloatArray, origin_M: FloatArray) -> None:
-    for i in range(3):
-        origin_M[i] = tip_M[i] - (R[i, 0] * tip_P[0] + R[i, 1] * tip_P[1] + R[i, 2] * tip_P[2])
-
-
-@helper
-def _free_step(
-    J: FloatArray, by_actuator: FloatArray, fixed: IntArray, first: int, M: FloatArray, pivot: IntArray, x: FloatArray
-) -> float:
-    """Solve the rows from `first` on for the free coordinates and, where that is 0, the actuators.
-
-    x (6,) : in place, the step by the coordinates, and then by the actuators.  Returns the determinant's sign.
-    """
-    size, column = 6 - first, 0
-    for c in range(6):
-        if fixed[c] == 0:
-            for i in range(size):
-                M[i, column] = J[first + i, c]
-            column += 1
-    for i in range(size):
-        x[i] = x[first + i]
-        for a in range(size - column):
-            M[i, column + a] = by_actuator[i, a]
-    sign = lu_factor(M[:size, :size], pivot)
-    if sign != 0.0:
-        lu_solve(M[:size, :size], pivot, x[:size])
-    return sign
-
-
-@helper
-def _move_freely(
-    fixed: IntArray,
-    x: FloatArray,
-    size_mm: float,
-    place: FloatArray,
-    R: FloatArray,
-    actuator_mm: FloatArray,
-    moved: FloatArray,
-) -> float:
-    """Take the step x of `_free_step`, a long one shortened; returns its length.  moved (6,) : room."""
-    step = max_abs(x)
-    share = STEP_LIMIT * size_mm / max(step, STEP_LIMIT * size_mm)
-    column = 0
-    for c in range(6):
-        moved[c] = 0.0
-        if fixed[c] == 0:
-            moved[c] = share * x[column]
-            column += 1
-    place += moved[:3]
-    rotate_in_place(R, moved[3] / size_mm, moved[4] / size_mm, moved[5] / size_mm)
-    for i in range(column, x.shape[0]):
-        actuator_mm[i - column] += share * x[i]
-    return step
-
-
-@helper
-def _check_solution(
-    J: FloatArray,
-    room: FloatArray,
-    pivot: IntArray,
-    residual_mm: float,
-    same_sign: bool,
-    R: FloatArray,
-    attitude_R: FloatArray,
-) -> int:
-    """The reason of a pose that Newton's method ended at; J and room (6, 6) are overwritten."""
-    if residual_mm > RESIDUAL_TOLERANCE_MM:
-        return NO_CONVERGENCE
-    if lu_factor(J, pivot) == 0.0 or inverse_norm(J, room) > AMPLIFICATION_LIMIT:
-        return NEAR_SINGULAR
-    return OK if same_sign and not is_turned_over(R, attitude_R) else OTHER_ASSEMBLY
-
-
-@helper
-def extend(
-    actuator_of_link: IntArray, rod_length_mm: FloatArray, lengths_mm: FloatArray, actuator_mm: FloatArray
-) -> None:
-    """Set actuators that each extend one link of their own to the links' lengths."""
-    for i in range(actuator_of_link.shape[0]):
-        actuator_mm[actuator_of_link[i]] = lengths_mm[i] - rod_length_mm[i]
-
-
-@helper
-def solve_inverse(
-    base_joints_M: FloatArray,
-    platform_joints_P: FloatArray,
-    revolute_axes: FloatArray,
-    hinges: IntArray,
-    kinds: IntArray,
-    cosine_M: FloatArray,
-    sine_M: FloatArray,
-    radius_mm: FloatArray,
-    actuator_of_link: IntArray,
-    rod_length_mm: FloatArray,
-    fixed: IntArray,
-    tip_M: FloatArray,
-    tip_P: FloatArray,
-    attitude_R: FloatArray,
-    guess_mm: FloatArray,
-    origin_M: FloatArray,
-    R: FloatArray,
-    actuator_mm: FloatArray,
-    lengths_mm: FloatArray,
-    joints_M: FloatArray,
-    iterations: IntArray,
-    residual_mm: FloatArray,
-    reason: IntArray,
-) -> None:
-    """See `compd.model.kinematics.actuators.inverse_kinematics`."""
-    n, m = actuator_of_link.shape[0], kinds.shape[0]
-    actuator_mm[:] = guess_mm
-    R[:, :] = attitude_R
-    iterations[0], residual_mm[0] = 0, math.nan
-    size_mm = platform_radius(platform_joints_P)
-    place = tip_M.copy()
-    value, pivot = np.empty(6), np.empty(6, np.int64)
-    J, M, by_actuator = np.empty((6, 6)), np.empty((6, 6)), np.empty((6, m))
-    finite = pose_is_finite(base_joints_M, platform_joints_P, revolute_axes, tip_M, R)
-    finite &= all_finite(tip_P) and all_finite(guess_mm) and all_finite(rod_length_mm)
-    reason[0] = (OK if size_mm > 0.0 else NEAR_SINGULAR) if finite else NOT_FINITE
-    extends_each = n == m and not kinds.any()
-    step, sign, first_sign = 0.0 if extends_each and n == 6 else math.inf, 0.0, 0.0
-    while reason[0] == OK:
-        _origin_at(place, R, tip_P, origin_M)
-        place_links(
-            kinds, cosine_M, sine_M, radius_mm, actuator_of_link, base_joints_M, rod_length_mm, actuator_mm,
-            joints_M, lengths_mm,
-        )  # fmt: skip
-        if not evaluate_closure(origin_M, R, joints_M, platform_joints_P, revolute_axes, hinges, size_mm, value, J):
-            reason[0] = UNREACHABLE
-            break
-        if extends_each:
-            lengths_mm[:] = value[:n]
-            extend(actuator_of_link, rod_length_mm, lengths_mm, actuator_mm)
-        value[:n] -= lengths_mm
-        if step <= STEP_TOLERANCE_MM:
-            break
-        if iterations[0] == ITERATION_LIMIT:
-            reason[0] = NO_CONVERGENCE
-            break
-        if not extends_each:
-            closure_by_actuators(
-                kinds, cosine_M, sine_M, radius_mm, actuator_of_link, hinges, actuator_mm, J, by_actuator
-            )
-        _rows_by_tip(J, R, tip_P, size_mm)
-        value[:] = -value
-        first = n if extends_each else 0
-        sign = _free_step(J, by_actuator, fixed, first, M, pivot, value)
-        if sign == 0.0:
-            reason[0] = NEAR_SINGULAR
-            break
-        if iterations[0] == 0:
-            first_sign = sign
-        step = _move_freely(fixed, value[: 6 - first], size_mm, place, R, actuator_mm, M[0])
-        iterations[0] += 1
-    if reason[0] == OK:
-        if iterations[0] > 0:
-            orthonormalise(R)
-        residual_mm[0] = max_abs(value)
-        reason[0] = _check_solution(J, M, pivot, residual_mm[0], sign == first_sign, R, attitude_R)
-    if reason[0] != OK:
-        origin_M[:] = actuator_mm[:] = lengths_mm[:] = math.nan
-        R[:, :] = joints_M[:, :] = math.nan
-
-
-inverse = kernel(
-    [
-        *[MATRIX, MATRIX, MATRIX, INTEGER_ROWS, INTEGERS, MATRIX, MATRIX, VECTOR, INTEGERS, VECTOR, INTEGERS],
-        *[VECTOR, VECTOR, MATRIX, VECTOR, VECTOR, MATRIX, VECTOR, VECTOR, MATRIX, INTEGERS, VECTOR, INTEGERS],
-    ],
-    "(n,d),(n,d),(k,d),(k,c),(m),(m,d),(m,d),(m),(n),(n),(s),(d),(d),(d,d),(m)->(d),(d,d),(m),(n),(n,d),(),(),()",
-)(solve_inverse)
 
 
 placed_links = kernel(

@@ -11,6 +11,7 @@ import numpy as np
 from compd.arrays import FloatArray
 from compd.jit import ROW_MATRICES, ROWS, helper, loop
 from compd.model.kernels.effects_on_machine import add_effect, add_effects, set_row
+from compd.model.kernels.inverse_solver import inverse_standing
 from compd.model.kernels.joints import shorten_by_joints
 from compd.model.kernels.machine_solver import (
     copy_frame,
@@ -39,7 +40,7 @@ from compd.model.kernels.row_arguments import (
     WantedRows,
     WarmRows,
 )
-from compd.model.kernels.standing_machine import forward_standing, inverse_standing, stand_on
+from compd.model.kernels.standing_machine import forward_standing, stand_on
 from compd.model.structures import GIVEN, MODELS
 from compd.rotation import to_inner_frame
 
@@ -65,31 +66,29 @@ def _solve_bare(
     frame, pose = result.bare_frame, result.bare_pose
     solve_frame(model, model.plate_points_M_mm, distances_mm, warm.supports_M_mm[w], frame)
     nominal, command, at_zero, standing = work.nominal, work.command, work.at_zero, work.standing
-    attitude = np.empty((3, 3))
     stand_on(model, model.zero_rotation_M_B, model.zero_base_joints_M_mm, at_zero)
     stand_on(model, frame.rotation_M_B, frame.base_joints_M_mm, standing)
-    shortening_mm, reason = np.empty(n), standing.joint_reason
-    shorten_by_joints(model.joint_weights[:n, :k], joint_mm, shortening_mm, reason)
+    shortened, reason = work.altered, standing.joint_reason
+    shorten_by_joints(model.joint_weights[:n, :k], joint_mm, shortened.joint_shortening_mm[:n], reason)
     if not machine_tool:
-        standing.joint_shortening_mm[:n] = shortening_mm
+        standing.joint_shortening_mm = shortened.joint_shortening_mm
         forward_standing(model, standing, scale_mm, warm.origin_M_mm[w], warm.rotation_M_P[w], pose)
         forward_standing(model, at_zero, scale_mm, warm.origin_M_mm[w], warm.rotation_M_P[w], nominal)
         set_contact(model, nominal, model.tool_mm, result.target_M_mm, result.target_P_mm)
         standing.joint_shortening_mm[:n] = 0.0
-        attitude[:, :] = nominal.rotation_M_P
     else:
         nominal.actuator_mm[:m] = warm.actuator_mm[w]
-        attitude[:, :] = wanted.attitude_M_P[r]
-        inverse_standing(model, at_zero, result.target_M_mm, result.target_P_mm, attitude, False, nominal)
+        attitude_M_P = wanted.attitude_M_P[r]
+        inverse_standing(model, at_zero, result.target_M_mm, result.target_P_mm, attitude_M_P, False, nominal)
     # what the frame does, and then what the joints do: an actuator may have several links
-    command.actuator_mm[:] = nominal.actuator_mm
-    inverse_standing(model, standing, result.target_M_mm, result.target_P_mm, attitude, False, command)
+    command.actuator_mm = nominal.actuator_mm
+    inverse_standing(model, standing, result.target_M_mm, result.target_P_mm, nominal.rotation_M_P, False, command)
     for a in range(m):
         contributions_mm[1, a] = command.actuator_mm[a] - nominal.actuator_mm[a]
         contributions_mm[0, a] = 0.0
     if k > 0:
-        standing.joint_shortening_mm[:n] = shortening_mm
-        inverse_standing(model, standing, result.target_M_mm, result.target_P_mm, attitude, True, command)
+        standing.joint_shortening_mm = shortened.joint_shortening_mm
+        inverse_standing(model, standing, result.target_M_mm, result.target_P_mm, nominal.rotation_M_P, True, command)
         for a in range(m):
             contributions_mm[0, a] = command.actuator_mm[a] - nominal.actuator_mm[a] - contributions_mm[1, a]
     if machine_tool:
@@ -130,10 +129,10 @@ def _finish(model: Any, result: Any, contributions_mm: FloatArray) -> None:
 def _set_warm(model: Any, warm: WarmRows, w: int, result: Any) -> None:
     """Where the next cycle starts: at this row's solution without effects, or where this row did if it failed."""
     if result.reason == OK:
-        result.warm_supports_M_mm[:, :] = result.bare_frame.supports_M_mm
-        result.warm_origin_M_mm[:] = result.bare_pose.origin_M_mm
-        result.warm_rotation_M_P[:, :] = result.bare_pose.rotation_M_P
-        result.warm_actuator_mm[:] = result.bare_pose.actuator_mm
+        result.warm_supports_M_mm = result.bare_frame.supports_M_mm
+        result.warm_origin_M_mm = result.bare_pose.origin_M_mm
+        result.warm_rotation_M_P = result.bare_pose.rotation_M_P
+        result.warm_actuator_mm = result.bare_pose.actuator_mm
         return
     result.warm_supports_M_mm[:, :] = warm.supports_M_mm[w]
     result.warm_origin_M_mm[:] = warm.origin_M_mm[w]
@@ -216,10 +215,6 @@ def compensate_rows(
     effects, memory, motion = program.effects, carried.memories, carried.motion
     model, work = models[0], solved.works[0]
     m = model.scales
-    added_mm = np.zeros((effects.shape[0], given.added_mm.shape[2]))
-    at_mm = np.empty(m)
-    attitude = np.empty((3, 3))
-    memory_before, motion_before = np.empty_like(memory), np.empty_like(motion)
     for r in range(gauges.scale_mm.shape[0]):
         result = solved.results[r]
         scale_mm, joint_mm, frame_mm, time_s = (
@@ -233,17 +228,13 @@ def compensate_rows(
         result.target_P_mm[:] = wanted.target_mm[r, 3:]
         _solve_bare(model, machine_tool, gauges, wanted, warm, r, work, result, contributions_mm[r])
         if effects.shape[0] > 0:
+            added_mm, at_mm = np.zeros((effects.shape[0], given.added_mm.shape[2])), np.empty(m)
+            memory_before, motion_before = memory.copy(), motion.copy()
             for i in range(m):
                 at_mm[i] = scale_mm[i]
                 if machine_tool:
                     effects_at_mm = given.effects_at_mm[r, i]
                     at_mm[i] = result.scale_setpoint_mm[i] if math.isnan(effects_at_mm) else effects_at_mm
-            if machine_tool:
-                attitude[:, :] = wanted.attitude_M_P[r]
-            else:
-                attitude[:, :] = work.nominal.rotation_M_P
-            memory_before[:] = memory
-            motion_before[:] = motion
             reason = OK
             for p in range(passes):
                 memory[:] = memory_before
@@ -271,7 +262,6 @@ def compensate_rows(
                     p == passes - 1,
                     joint_mm,
                     frame_mm,
-                    attitude,
                     work,
                     result,
                     contributions_mm[r],

@@ -13,11 +13,12 @@ import numpy as np
 from compd.arrays import FloatArray
 from compd.jit import helper
 from compd.model.kernels.effect_dispatch import set_basis
+from compd.model.kernels.inverse_solver import inverse_standing
 from compd.model.kernels.joints import shorten_by_joints
 from compd.model.kernels.machine_solver import copy_frame, copy_pose, frame_change_mm, solve_frame
 from compd.model.kernels.reason_codes import OK
 from compd.model.kernels.row_arguments import EffectArrays
-from compd.model.kernels.standing_machine import inverse_standing, stand_parts
+from compd.model.kernels.standing_machine import stand_parts
 from compd.model.structures import FRAME, LENGTHS
 from compd.rotation import to_outer_frame
 
@@ -40,13 +41,13 @@ def set_row(
     row.links, row.scales = n, m
     row.time_s = time_s
     row.session_start = 1 if starts else 0
-    joint_M_mm = np.empty(3)
     for i in range(n):
         row.link_mm[i] = pose.link_length_mm[i]
-        to_outer_frame(pose.rotation_M_P, pose.origin_M_mm, model.platform_joints_P_mm[i], joint_M_mm)
+        to_outer_frame(pose.rotation_M_P, pose.origin_M_mm, model.platform_joints_P_mm[i], row.directions_M[i])
         for j in range(3):
             row.base_joints_M_mm[i, j] = pose.base_joints_M_mm[i, j]
-            row.directions_M[i, j] = (joint_M_mm[j] - pose.base_joints_M_mm[i, j]) / pose.link_length_mm[i]
+            row.directions_M[i, j] -= pose.base_joints_M_mm[i, j]
+            row.directions_M[i, j] /= pose.link_length_mm[i]
     for i in range(k):
         row.joint_mm[i] = joint_mm[i]
     for i in range(9):
@@ -70,10 +71,10 @@ def add_effect(
     program: EffectArrays, e: int, row: Any, quantities: FloatArray, memory: FloatArray, added: FloatArray
 ) -> None:
     """Add basis @ theta of effect e to the row of numbers `added`. memory : of all effects."""
-    effect = program.effects[e]
+    effect, theta, targets, indices = program.effects[e], program.theta, program.targets, program.quantity_indices
     needed = np.empty(effect.quantities_end - effect.quantities_begin)
     for i in range(needed.shape[0]):
-        needed[i] = quantities[program.quantity_indices[effect.quantities_begin + i]]
+        needed[i] = quantities[indices[effect.quantities_begin + i]]
     parameters = effect.theta_end - effect.theta_begin
     basis = np.zeros((effect.size, parameters))
     set_basis(
@@ -89,8 +90,8 @@ def add_effect(
     for i in range(effect.size):
         total = 0.0
         for p in range(parameters):
-            total += basis[i, p] * program.theta[effect.theta_begin + p]
-        added[program.targets[effect.targets_begin + i]] += total
+            total += basis[i, p] * theta[effect.theta_begin + p]
+        added[targets[effect.targets_begin + i]] += total
 
 
 @helper
@@ -151,7 +152,6 @@ def add_effects(
     every: bool,
     joint_mm: FloatArray,
     frame_mm: FloatArray,
-    attitude_M_P: FloatArray,
     work: Any,
     result: Any,
     contributions_mm: FloatArray,
@@ -165,7 +165,6 @@ def add_effects(
     """
     m = model.scales
     total_mm = np.zeros(added_mm.shape[1])
-    tip_M_mm, tip_P_mm = np.empty(3), np.empty(3)
     level = LENGTHS
     reason = OK
     copy_frame(result.bare_frame, result.frame)
@@ -179,9 +178,10 @@ def add_effects(
             continue
         altered = work.altered
         _add_to_machine(model, total_mm, level, joint_mm, frame_mm, result.bare_frame, result.frame, altered)
-        tip_M_mm[:] = altered.tool_mm if model.tool_on_plate else result.target_M_mm
-        tip_P_mm[:] = result.target_P_mm if model.tool_on_plate else altered.tool_mm
-        work.with_effects.actuator_mm[:] = work.command.actuator_mm
+        tip_M_mm = altered.tool_mm if model.tool_on_plate else result.target_M_mm
+        tip_P_mm = result.target_P_mm if model.tool_on_plate else altered.tool_mm
+        work.with_effects.actuator_mm = work.command.actuator_mm
+        attitude_M_P = work.nominal.rotation_M_P
         inverse_standing(model, altered, tip_M_mm, tip_P_mm, attitude_M_P, level == LENGTHS, work.with_effects)
         for i in range(m):
             setpoint = work.with_effects.actuator_mm[i] - model.zero_actuator_mm[i] - altered.scale_mm[i]

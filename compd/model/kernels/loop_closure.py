@@ -19,7 +19,7 @@ import numpy as np
 
 from compd.arrays import FloatArray, IntArray
 from compd.jit import INTEGER_ROWS, INTEGERS, MATRIX, VECTOR, helper, kernel
-from compd.linear import all_finite
+from compd.linear import all_finite, rows_finite
 from compd.model.kernels.reason_codes import NEAR_SINGULAR, NOT_FINITE, OK
 
 # Two joint centres nearer than this coincide: the link between them has no direction.
@@ -115,16 +115,8 @@ def pose_is_finite(
     R: FloatArray,
 ) -> bool:
     """Whether all numbers of the mechanism and of a pose, or of a guess of one, are finite."""
-    for i in range(3):
-        if not all_finite(R[i]):
-            return False
-    for i in range(base_joints_M.shape[0]):
-        if not (all_finite(base_joints_M[i]) and all_finite(platform_joints_P[i])):
-            return False
-    for i in range(revolute_axes.shape[0]):
-        if not all_finite(revolute_axes[i]):
-            return False
-    return all_finite(origin_M)
+    finite = rows_finite(base_joints_M) and rows_finite(platform_joints_P) and rows_finite(revolute_axes)
+    return finite and rows_finite(R) and all_finite(origin_M)
 
 
 @helper

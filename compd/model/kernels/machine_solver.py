@@ -70,24 +70,24 @@ def set_contact(model: Any, pose: Any, tool_mm: FloatArray, tip_M_mm: FloatArray
 
 @helper
 def copy_frame(source: Any, copy: Any) -> None:
-    copy.supports_M_mm[:, :] = source.supports_M_mm
-    copy.origin_M_mm[:] = source.origin_M_mm
-    copy.rotation_M_B[:, :] = source.rotation_M_B
-    copy.base_joints_M_mm[:, :] = source.base_joints_M_mm
-    copy.displacement_M_mm[:] = source.displacement_M_mm
-    copy.rotation_M_rad[:] = source.rotation_M_rad
-    copy.iterations[:] = source.iterations
-    copy.residual_mm[:] = source.residual_mm
-    copy.reason[:] = source.reason
+    copy.supports_M_mm = source.supports_M_mm
+    copy.origin_M_mm = source.origin_M_mm
+    copy.rotation_M_B = source.rotation_M_B
+    copy.base_joints_M_mm = source.base_joints_M_mm
+    copy.displacement_M_mm = source.displacement_M_mm
+    copy.rotation_M_rad = source.rotation_M_rad
+    copy.iterations = source.iterations
+    copy.residual_mm = source.residual_mm
+    copy.reason = source.reason
 
 
 @helper
 def copy_pose(source: Any, copy: Any) -> None:
-    copy.base_joints_M_mm[:, :] = source.base_joints_M_mm
-    copy.actuator_mm[:] = source.actuator_mm
-    copy.origin_M_mm[:] = source.origin_M_mm
-    copy.rotation_M_P[:, :] = source.rotation_M_P
-    copy.link_length_mm[:] = source.link_length_mm
-    copy.iterations[:] = source.iterations
-    copy.residual_mm[:] = source.residual_mm
-    copy.reason[:] = source.reason
+    copy.base_joints_M_mm = source.base_joints_M_mm
+    copy.actuator_mm = source.actuator_mm
+    copy.origin_M_mm = source.origin_M_mm
+    copy.rotation_M_P = source.rotation_M_P
+    copy.link_length_mm = source.link_length_mm
+    copy.iterations = source.iterations
+    copy.residual_mm = source.residual_mm
+    copy.reason = source.reason

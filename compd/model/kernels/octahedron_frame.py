@@ -25,7 +25,7 @@ import numpy as np
 
 from compd.arrays import FloatArray, IntArray
 from compd.jit import INTEGERS, MATRIX, VECTOR, helper, kernel
-from compd.linear import all_finite, inverse_norm, lu_factor, lu_solve, max_abs
+from compd.linear import all_finite, inverse_norm, lu_factor, lu_solve, max_abs, rows_finite
 from compd.model.kernels.reason_codes import NEAR_SINGULAR, NO_CONVERGENCE, NOT_FINITE, OK, OTHER_ASSEMBLY, UNREACHABLE
 from compd.model.kernels.solve_status import (
     AMPLIFICATION_LIMIT,
@@ -130,11 +130,8 @@ def _edges_can_close(lengths_mm: FloatArray, plate_points_M: FloatArray) -> bool
 
 @helper
 def _input_reason(lengths_mm: FloatArray, plate_points_M: FloatArray, guess_supports_M: FloatArray) -> int:
-    if not all_finite(lengths_mm):
+    if not (all_finite(lengths_mm) and rows_finite(guess_supports_M) and rows_finite(plate_points_M)):
         return NOT_FINITE
-    for i in range(3):
-        if not (all_finite(guess_supports_M[i]) and all_finite(plate_points_M[i])):
-            return NOT_FINITE
     return OK if np.min(lengths_mm) > 0.0 else UNREACHABLE
 
 

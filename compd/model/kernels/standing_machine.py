@@ -1,4 +1,4 @@
-"""Forward and inverse of a machine on a frame that has moved, and with what effects add.
+"""A machine, and its forward kinematics, on a frame that has moved, and with what effects add.
 
 What a base carries turns with it: the rails and circles of its actuators, and the axes of its hinges.
 """
@@ -11,7 +11,7 @@ import numpy as np
 
 from compd.arrays import FloatArray
 from compd.jit import helper
-from compd.model.kernels.actuated_links import EXTENDS, extend, place_links, solve_inverse
+from compd.model.kernels.actuated_links import EXTENDS, place_links
 from compd.model.kernels.forward_solver import solve_forward
 from compd.rotation import to_inner_frame, to_outer_frame
 
@@ -27,10 +27,10 @@ def stand_on(model: Any, rotation_M_B: FloatArray, base_joints_M_mm: FloatArray,
 @helper
 def stand_parts(model: Any, rotation_M_B: FloatArray, base_joints_M_mm: FloatArray, machine: Any) -> None:
     """As `stand_on`, with what is added to the lengths as it was."""
-    machine.base_joints_M_mm[:, :] = base_joints_M_mm
-    machine.platform_joints_P_mm[:, :] = model.platform_joints_P_mm
-    machine.revolute_axes_P[:, :] = model.revolute_axes_P
-    machine.tool_mm[:] = model.tool_mm
+    machine.base_joints_M_mm = base_joints_M_mm
+    machine.platform_joints_P_mm = model.platform_joints_P_mm
+    machine.revolute_axes_P = model.revolute_axes_P
+    machine.tool_mm = model.tool_mm
     for a in range(model.scales):
         if model.kinds[a] != EXTENDS:
             turn_with_base(model, rotation_M_B, model.cosine_M[a], machine.cosine_M[a])
@@ -69,6 +69,14 @@ def place_standing(
 
 
 @helper
+def place_with_added(model: Any, machine: Any, pose: Any) -> None:
+    """Base joints and link lengths with the actuators of the pose, and what joints and effects add to the lengths."""
+    place_standing(model, machine, pose.actuator_mm, pose.base_joints_M_mm, pose.link_length_mm)
+    for i in range(model.links):
+        pose.link_length_mm[i] += machine.reading_to_length_mm[i] - machine.joint_shortening_mm[i]
+
+
+@helper
 def forward_standing(
     model: Any,
     machine: Any,
@@ -81,9 +89,7 @@ def forward_standing(
     n, k = model.links, model.axes
     for a in range(model.scales):
         pose.actuator_mm[a] = model.zero_actuator_mm[a] + scale_mm[a]
-    place_standing(model, machine, pose.actuator_mm, pose.base_joints_M_mm, pose.link_length_mm)
-    for i in range(n):
-        pose.link_length_mm[i] += machine.reading_to_length_mm[i] - machine.joint_shortening_mm[i]
+    place_with_added(model, machine, pose)
     solve_forward(
         pose.base_joints_M_mm[:n],
         machine.platform_joints_P_mm[:n],
@@ -95,54 +101,6 @@ def forward_standing(
         pose.origin_M_mm,
         pose.rotation_M_P,
         pose.link_length_mm[:n],
-        pose.iterations,
-        pose.residual_mm,
-        pose.reason,
-    )
-
-
-@helper
-def inverse_standing(
-    model: Any,
-    machine: Any,
-    tip_M_mm: FloatArray,
-    tip_P_mm: FloatArray,
-    attitude_M_P: FloatArray,
-    same_pose: bool,
-    pose: Any,
-) -> None:
-    """The pose and the actuators that bring the tip to its target; pose.actuator_mm : where they are about.
-
-    same_pose : `pose` reaches this target on a machine that differs in nothing but its links' lengths.
-    """
-    n, m, k = model.links, model.scales, model.axes
-    rod_length_mm = np.empty(n)
-    for i in range(n):
-        rod_length_mm[i] = model.rod_length_mm[i] + machine.reading_to_length_mm[i] - machine.joint_shortening_mm[i]
-    if same_pose and model.extends_each:
-        extend(model.of_link[:n], rod_length_mm, pose.link_length_mm, pose.actuator_mm)
-        return
-    solve_inverse(
-        machine.base_joints_M_mm[:n],
-        machine.platform_joints_P_mm[:n],
-        machine.revolute_axes_P[:k],
-        model.hinges[:k],
-        model.kinds[:m],
-        machine.cosine_M[:m],
-        machine.sine_M[:m],
-        model.radius_mm[:m],
-        model.of_link[:n],
-        rod_length_mm,
-        model.fixed[:],
-        tip_M_mm[:],
-        tip_P_mm[:],
-        attitude_M_P[:],
-        pose.actuator_mm[:m],
-        pose.origin_M_mm,
-        pose.rotation_M_P,
-        pose.actuator_mm[:m],
-        pose.link_length_mm[:n],
-        pose.base_joints_M_mm[:n],
         pose.iterations,
         pose.residual_mm,
         pose.reason,

@@ -63,17 +63,7 @@ def set_tip_by_closure(
     for i in range(n):
         row.link_mm[i] = value_mm[i]
         row.directions_M[i] = J[i, :3]
-    closure_by_actuators(
-        model.kinds[:m],
-        machine.cosine_M[:m],
-        machine.sine_M[:m],
-        model.radius_mm[:m],
-        model.of_link[:n],
-        model.hinges[:a],
-        pose.actuator_mm[:m],
-        J,
-        by_scale,
-    )
+    closure_by_actuators(model, machine, pose.actuator_mm, J, by_scale)
     for i in range(6):
         for j in range(m):
             by_scale[i, j] = -by_scale[i, j]

@@ -9,6 +9,7 @@ from .solver_structures import EFFECT as EFFECT
 from .solver_structures import EFFECTS as EFFECTS
 from .solver_structures import FRAME as FRAME
 from .solver_structures import GIVEN as GIVEN
+from .solver_structures import INVERSE as INVERSE
 from .solver_structures import LENGTHS as LENGTHS
 from .solver_structures import MECHANISM as MECHANISM
 from .solver_structures import MODEL as MODEL

@@ -110,7 +110,8 @@ SOLVED_POSE = np.dtype(
 )
 
 # The machine between gauges and platform, of `compd.model.prediction.PerturbedMachine`: base joints with the actuators
-# at 0, cosine_M and sine_M where the base has turned them; scale_mm: what is added to the scales' readings.
+# at 0, cosine_M and sine_M where the base has turned them; scale_mm: what is added to the scales' readings. What
+# follows joint_reason is room for the inverse kinematics.
 SOLVED_MACHINE = np.dtype(
     [
         ("cosine_M", *_POINTS),
@@ -123,6 +124,11 @@ SOLVED_MACHINE = np.dtype(
         ("joint_shortening_mm", *_LENGTHS),
         ("reading_to_length_mm", *_LENGTHS),
         ("joint_reason", np.int64, (1,)),
+        ("place_M_mm", *_VECTOR),
+        ("closure_mm", np.float64, 6),
+        ("jacobian", np.float64, (6, 6)),
+        ("factored", np.float64, (6, 6)),
+        ("pivot", np.int64, 6),
     ]
 )
 
@@ -164,6 +170,9 @@ WORKSPACE = np.dtype(
         ("with_effects", SOLVED_POSE),
     ]
 )
+
+# What the inverse kinematics of one machine is computed in.
+INVERSE = np.dtype([("model", MODEL), ("machine", SOLVED_MACHINE), ("pose", SOLVED_POSE)])
 
 MODELS = from_dtype(MODEL)[::1]
 EFFECTS = from_dtype(EFFECT)[::1]
