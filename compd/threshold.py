@@ -25,7 +25,7 @@ class Threshold(NamedTuple):
 def thresholds(kind: type[Any]) -> dict[str, Threshold]:
     """Every threshold of a class of criteria by its name, of a section with the section's: "search.max_members"."""
     found: dict[str, Threshold] = {}
-    texts = _texts(kind)
+    texts = _texts(kind)  # type: ignore[arg-type]  # classes are hashable
     for field in fields(kind):
         if is_dataclass(section := field.default):
             found |= {f"{field.name}.{name}": each for name, each in thresholds(type(section)).items()}
