@@ -1,9 +1,6 @@
 from .live import LIVE_SPEEDUP as LIVE_SPEEDUP
 from .live import run_live as run_live
 from .machine_zero import take_zero as take_zero
-from .page import progress as progress
-from .page import summarise as summarise
-from .page import verdict as verdict
 from .page import write_demo_page as write_demo_page
 from .processes import Command as Command
 from .processes import run_commands as run_commands
@@ -11,3 +8,6 @@ from .processes import simulated_daemon as simulated_daemon
 from .session import SPEEDUP as SPEEDUP
 from .session import DemoSession as DemoSession
 from .session import run_demo as run_demo
+from .summary import progress as progress
+from .summary import summarise as summarise
+from .summary import verdict as verdict

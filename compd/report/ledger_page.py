@@ -10,28 +10,9 @@ from plotly.graph_objects import Figure, Scatter
 
 from compd.display_unit import format_error
 from compd.model_file import StoredModel
+from compd.report.ledger_table import LEDGER_HEAD, ledger_rows
 from compd.report.page import COLOURS, Panel, style_figure, write_page
 from compd.report.page_table import PageTable
-from compd.text import number_text
-
-LEDGER_HEAD = ("", "step", "fitted on", "before", "after", "floor", "unit", "date")
-
-
-def ledger_rows(model: StoredModel) -> list[list[str]]:
-    """One line per step."""
-    return [
-        [
-            str(k),
-            f"{step.kind} {step.effect}".rstrip() + (" (undone)" if step.undone else ""),
-            step.recording,
-            number_text(step.rms_before_um, digits=3),
-            number_text(step.rms_after_um, digits=3),
-            number_text(step.noise_floor_um, digits=3),
-            step.unit,
-            step.date[:10],
-        ]
-        for k, step in enumerate(model.steps, start=1)
-    ]
 
 
 def write_ledger_page(path: Path, model: StoredModel) -> None:

@@ -116,7 +116,7 @@ def _systemctl(stage: Path, arguments: list[str]) -> None:
 def _check_unit(stage: Path, unit: Path) -> None:
     """The unit's program and configuration are there, its user has been made, and systemd accepts it."""
     text = unit.read_text()
-    start = re.search(r"(?m)^ExecStart=(\S+) (?:run|page) (\S+)(?: .*)?$", text)
+    start = re.search(r"(?m)^ExecStart=(\S+) (?:run|page --daemon) (\S+)(?: .*)?$", text)
     user = re.search(r"(?m)^User=(\S+)$", text)
     assert start is not None, text
     assert user is not None, text

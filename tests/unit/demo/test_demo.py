@@ -15,8 +15,8 @@ from compd.configuration import load
 from compd.demo import machine_zero
 from compd.demo import session as session_module
 from compd.demo.machine_zero import GAUGES_TIMEOUT_S, take_zero
-from compd.demo.page import verdict
 from compd.demo.session import DemoSession, DemoVisit, run_demo
+from compd.demo.summary import verdict
 from compd.errors import CompdError, DaemonError
 from compd.gauge import Quality
 from tests.support.paths import CONFIG

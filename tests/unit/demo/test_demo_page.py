@@ -5,8 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from compd.demo.page import error_rows, timing_rows, verdict, write_demo_page
+from compd.demo.page import write_demo_page
 from compd.demo.session import DemoSession, DemoVisit
+from compd.demo.summary import error_rows, timing_rows, verdict
 from compd.text import typeset
 
 SETPOINT: dict[str, Any] = {
