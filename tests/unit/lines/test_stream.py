@@ -6,6 +6,7 @@ import itertools
 import math
 import os
 import socket
+import struct
 import termios
 import tty
 from collections.abc import Iterator
@@ -346,6 +347,19 @@ def test_tcp_lines_talk_and_are_lost_when_the_device_closes(server: socket.socke
         line.receive(1)
     assert caught.value.quality is Quality.LINE_LOST
     line.close()
+
+
+def test_a_socket_whose_other_end_has_reset_it_is_closed(server: socket.socket) -> None:
+    host, number = server.getsockname()
+    port = SerialPort(f"socket://{host}:{number}", 9600, "8N1", low_latency=False, write_timeout_s=1.0)
+    connection = port._port._socket
+    device, _ = server.accept()
+    device.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
+    device.close()
+    with pytest.raises(ConnectionResetError):
+        connection.recv(1)
+    port.close()
+    assert connection.fileno() == -1
 
 
 def test_tcp_refused_is_a_lost_line() -> None:
