@@ -73,6 +73,8 @@ def flat(world: World, rng: np.random.Generator) -> Iterator[tuple[FloatArray, F
             yield np.array([x, y, 0.0]), np.zeros(3)
 
 
+@pytest.mark.long
+@pytest.mark.sample
 def test_gains_from_one_height_stay_as_drawn_with_a_warning(tmp_path: Path) -> None:
     world, rng = world_of(tmp_path, "6-ups", seed=5, tolerance_mm=1.0)
     # gains that change with the reading, by 0.3 mm at the ends
@@ -106,6 +108,8 @@ def test_poses_at_one_height_end_in_refusals_or_warnings(kind: str, pose: bool, 
     assert any("along z" in warning for warning in result.warnings)
 
 
+@pytest.mark.long
+@pytest.mark.sample
 def test_several_recordings_with_instruments_of_their_own_tell_more_than_one(tmp_path: Path) -> None:
     world, rng = world_of(tmp_path, "6-pus", seed=4)
     days = [opened(record(tmp_path / f"day-{day}.csv", world, rng, 30)) for day in range(3)]
@@ -115,6 +119,8 @@ def test_several_recordings_with_instruments_of_their_own_tell_more_than_one(tmp
     assert three.sealed[0].after_rms_um < one.sealed[0].after_rms_um
 
 
+@pytest.mark.long
+@pytest.mark.sample
 def test_positions_of_a_reflector_alone_serve_as_well(tmp_path: Path) -> None:
     world, rng = world_of(tmp_path, "linear-delta", seed=6)
     learned = opened(record(tmp_path / "monday.csv", world, rng, POSES, pose=False))
@@ -126,6 +132,8 @@ def test_positions_of_a_reflector_alone_serve_as_well(tmp_path: Path) -> None:
 THREE = {"A": [60.0, 0.0, -15.0], "B": [-30.0, 50.0, 10.0], "C": [-30.0, -50.0, 25.0]}
 
 
+@pytest.mark.long
+@pytest.mark.sample
 def test_three_reflectors_at_different_places_tell_what_turns_the_platform(tmp_path: Path) -> None:
     world, rng = world_of(tmp_path, "6-ups", seed=6)
     learned = opened(record(tmp_path / "monday.csv", world, rng, 3 * POSES, pose=False, reflectors=THREE))

@@ -46,7 +46,7 @@ def plane_recording(path: Path, world: World, rng: np.random.Generator, axis: st
     return path
 
 
-@pytest.mark.parametrize("seed", [21, 22])
+@pytest.mark.parametrize("seed", [21, pytest.param(22, marks=[pytest.mark.long, pytest.mark.sample])])
 def test_touches_of_three_oblique_planes_calibrate_all_but_the_scale_of_length(seed: int, tmp_path: Path) -> None:
     rng = np.random.default_rng(seed)
     world = built(drawing("6-ups", tmp_path), rng)

@@ -28,7 +28,13 @@ def learned_in_the_middle(kind: str, directory: Path) -> tuple[compd.Calibration
     return result, result.prediction
 
 
-@pytest.mark.parametrize("kind", ["6-ups", "3-prs", "linear-delta"])
+@pytest.mark.parametrize(
+    "kind",
+    [
+        "6-ups",
+        *(pytest.param(kind, marks=[pytest.mark.long, pytest.mark.sample]) for kind in ("3-prs", "linear-delta")),
+    ],
+)
 def test_the_error_elsewhere_is_as_large_as_said_and_grows_outside(kind: str, tmp_path: Path) -> None:
     result, prediction = learned_in_the_middle(kind, tmp_path)
     off_mm = np.abs(prediction.place_mm - prediction.measured_mm.mean(axis=0))
@@ -54,6 +60,8 @@ def test_slices_cover_the_workspace_with_the_measured_poses(tmp_path: Path) -> N
     assert f"largest {prediction.std_um.max():.3g} um" in prediction.words
 
 
+@pytest.mark.long
+@pytest.mark.sample
 def test_slices_of_a_hexapod_are_through_places_and_through_turns(tmp_path: Path) -> None:
     _, prediction = learned_in_the_middle("6-ups", tmp_path)
     places, turns = prediction.slices[:3], prediction.slices[3:]
@@ -67,6 +75,8 @@ def test_slices_of_a_hexapod_are_through_places_and_through_turns(tmp_path: Path
         assert one.std_um[middle, middle] == pytest.approx(places[0].std_um[middle, middle])
 
 
+@pytest.mark.long
+@pytest.mark.sample
 def test_a_map_ends_where_the_links_do(tmp_path: Path) -> None:
     """A stroke that the configuration states; without one, a share of a link's length."""
     widths = []

@@ -35,6 +35,8 @@ def diagnosed(recorded: Path, tolerance: str, **options: list[str]) -> Diagnosis
     return compd.diagnose(compd.open_recording(recorded, machine=machine(folder, tolerance), **options))
 
 
+@pytest.mark.long
+@pytest.mark.sample
 def test_the_number_and_the_question_are_in_the_headline(recorded: Path) -> None:
     diagnosis = diagnosed(recorded, "ground")
     assert diagnosis.verdict in ("partial", "unexplained")

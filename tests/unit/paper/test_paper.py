@@ -97,6 +97,8 @@ def test_the_script_prints_a_table_and_draws_a_page(tmp_path: Path, experiment: 
     assert text.count("Plotly.newPlot") >= 1
 
 
+@pytest.mark.long
+@pytest.mark.sample
 def test_the_script_takes_a_machine_a_page_and_a_seed_and_says_what_is_wrong(tmp_path: Path) -> None:
     page = tmp_path / "pictures" / "hexapod.html"
     done = run_script(tmp_path, "fig20", str(HEXAPOD), "--seed", "2", "--page", str(page))

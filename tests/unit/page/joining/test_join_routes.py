@@ -144,6 +144,8 @@ def test_what_is_written_is_what_the_command_line_writes(client, recordings, nam
         assert line in typeset(printed)
 
 
+@pytest.mark.long
+@pytest.mark.sample
 def test_a_trial_by_time_has_the_offset_in_a_curve(client):
     answer = client.post("/join/trial", json={"recording": GAUGES, "export": TRACK}).json()["time"]
     assert answer["peak"][0] == pytest.approx(137.25, abs=0.5)

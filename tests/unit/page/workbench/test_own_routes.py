@@ -70,6 +70,8 @@ def test_what_cannot_be_opened_leaves_nothing_behind(client_of, directory):
     assert set(workbench_threads()) <= set(before)
 
 
+@pytest.mark.long
+@pytest.mark.sample
 def test_only_so_many_are_open_and_the_oldest_makes_room(client_of, monkeypatch):
     monkeypatch.setattr(routes, "MAX_OPEN", 2)
     client = client_of("view")
