@@ -75,6 +75,8 @@ def _leave_things_as_they_were() -> None:
     if log_file is not None and log_file.closed:
         structlog.reset_defaults()
     logging.lastResort = _LAST_RESORT
+    # workers of a page import nothing from their directory; the examples' scripts do
+    os.environ.pop("PYTHONSAFEPATH", None)
 
 
 @contextmanager

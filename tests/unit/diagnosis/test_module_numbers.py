@@ -77,7 +77,7 @@ NUMBERS = {
     "comparison/sampling_error.py": {"SECONDS_PER_HOUR": DEFINITION},
     "comparison/thinning.py": {"SEED": SEED},
     "diagnosis/implausible_effect.py": {"_FREE": CONDITIONING},
-    "diagnosis/undetermined.py": {"_NAMED_SHARE": WORDS, "MAX_NAMED": WORDS, "_ALIKE": WORDS},
+    "diagnosis/candidate_result.py": {"_NAMED_SHARE": WORDS, "MAX_NAMED": WORDS, "_ALIKE": WORDS},
     "diagnosis/candidates/changes.py": {"MIN_SHARE": ROUNDING},
     "diagnosis/candidates/proxies.py": {"ZERO_DEGC_K": DEFINITION},
     "diagnosis/candidates/constant.py": {"MM_PER_UM": DEFINITION, "MIN_OUTSIDE": ROUNDING},
