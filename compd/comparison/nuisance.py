@@ -20,7 +20,19 @@ from compd.units import UM_PER_MM
 
 
 def initial_state_columns(aligned: AlignedRecording, effect: Effect, constants: ConstantValues) -> FloatArray:
-    """(N, m, Q) by how many um each unknown state at the start of each session moves the prediction, per unit of it.
+    """States unknown when a session begins: how warm a rod already was behind the skin that a thermometer sees.
+
+    An effect with a lag computes y from x, tau dy/dt = x - y, and starts each session in equilibrium, y = x. A machine
+    that had been warming up was not: what is missing then, (y0 - x0) exp(-t / tau) at each link in each session, is no
+    error of the effect. It is linear in y0 - x0, and fitted along as the frame of an instrument is. The columns are
+    differences: the effect with one state of its memory (`Effect.unknown_states`) greater by 1 in the first row of one
+    session, less the effect without.
+
+    Example: on a tripod with four sessions link_expansion_lag has twelve unknown states::
+
+        initial_state_columns(aligned, library["link_expansion_lag"], {"tau": 900.0}).shape  # (N, 3, 12)
+
+    (N, m, Q) by how many um each unknown state at the start of each session moves the prediction, per unit of it.
 
     The Q states are those of the first session, then of the next; a state moves only the rows of its own session. None,
     Q = 0, for an effect without unknown states.

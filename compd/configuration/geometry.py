@@ -66,7 +66,10 @@ class Hinge(Section):
 
 
 class MechanismDescription(NamedTuple):
-    """The links of a machine.
+    """The links of a machine as one description, whichever keys its configuration is written with.
+
+    A machine has n rods, m actuators and k = 6 - n hinges. `kinematics: tripod_3spr` and `hexapod_6ups` are short for
+    actuators that extend one rod each; every other machine states `actuators`, `rods`, `hinges` and `target_fixes`.
 
     actuators : m of them.  rods : n.  hinges : k = 6 - n.
     target_fixes : the m coordinates that a target fixes: x, y, z of the tip, turns a, b, c about x, y, z of {M}.
@@ -100,7 +103,11 @@ _ROOT = "geometry"
 
 
 class GeometryKeys(NamedTuple):
-    """The places of a geometry's numbers; links, hinges and actuators count from 0.
+    """Where the numbers of a geometry stand in its file, in either form of a geometry.
+
+    `described` reads both forms into one description; this is the way back.
+
+    The places of a geometry's numbers; links, hinges and actuators count from 0.
 
     by_rods : whether it is stated by `actuators` and `rods`.  hinge_names : the key of the axis of each hinge.
     tool_on_platform : whether the platform carries the tool.

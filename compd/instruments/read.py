@@ -28,7 +28,10 @@ _COMMENT = ("#", "%", "//")
 
 
 def is_table(lines: Sequence[str]) -> bool:
-    """Whether most of the lines with a number in them have equally many cells, and many of the cells are numbers."""
+    """When a text counts as a table of measurements: before that, no message quotes anything of it.
+
+    Whether most of the lines with a number in them have equally many cells, and many of the cells are numbers.
+    """
     rows = [_BETWEEN.split(line.strip()) for line in lines[:_RECOGNISED_BY] if not line.lstrip().startswith(_COMMENT)]
     rows = [cells for cells in rows if any(map(is_number, cells))]
     if not rows:

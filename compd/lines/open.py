@@ -29,6 +29,7 @@ def _definitions() -> dict[str, LineDefinition]:
     return {definition.kind: definition for definition in sorted(found, key=lambda one: (one.order, one.kind))}
 
 
+# By name: every folder in compd/lines/kinds. Nothing else lists them.
 KINDS: Mapping[str, LineDefinition] = _definitions()
 # The keys of a line of any kind, and of several lines by name, for pydantic.
 ANY_LINE: Any = Annotated[Union[tuple(kind.settings for kind in KINDS.values())], Field(discriminator="kind")]  # noqa: UP007

@@ -49,7 +49,14 @@ class _Kept:
 
 
 class Moments:
-    """Events of the last hour by time; used by the event loop's thread alone."""
+    """History of live events as they were sent: ten a second for the last minute, one a second for the hour.
+
+    The tables of the history are for charts. Here is the rest of a cycle, which a page that is frozen or scrubbed
+    shows: the machine's pose, what the corrections and the tip are made of, the shadow, every gauge. STATUS (timing of
+    the loop, clients) is not kept.
+
+    Events of the last hour by time; used by the event loop's thread alone.
+    """
 
     def __init__(self) -> None:
         self._kept = (_Kept(FINE_S, FINE_HZ), _Kept(COARSE_S, COARSE_HZ))

@@ -26,7 +26,9 @@ def degraded_comparators(
     now_s: float,
     settings: LoopSettings,
 ) -> tuple[ComparatorSet | None, UsableComparators]:
-    """The newest good readings of every group, and what to compute with.
+    """`on_stale: degrade`: each group of gauges fades by itself, and its correction is absent when that has ended.
+
+    The newest good readings of every group, and what to compute with.
 
     Parameters
     ----------

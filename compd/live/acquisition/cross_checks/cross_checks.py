@@ -27,7 +27,10 @@ _MAX_S = 1.0
 
 
 class TipSpeed:
-    """Compares the tips of setpoints; names the scale that has moved most."""
+    """CMM mode: a scale is wrong if the tip would move faster than the machine can.
+
+    Compares the tips of setpoints; names the scale that has moved most.
+    """
 
     def __init__(self, largest_mm_per_s: float) -> None:
         self._largest_mm_per_s = largest_mm_per_s
@@ -59,7 +62,14 @@ _MIN_OTHERS = 2
 
 
 class StandingTemperature:
-    """Remembers the values of all thermometers when each of them last changed its digits."""
+    """A thermometer is stuck if it repeats its digits while all others of the machine grow warmer, or colder.
+
+    One in a body that changes slowly shows other digits, too: no two tenths of a degree in the time in which every
+    other one changes by kelvins. Where its digits are too coarse for that, it has changed by less than one of them, and
+    so little it is wrong.
+
+    Remembers the values of all thermometers when each of them last changed its digits.
+    """
 
     def __init__(self, changed_K: float) -> None:
         """`changed_K`: least change of all others, in the same direction."""
@@ -95,7 +105,15 @@ _MIN_CHANGES = 100
 
 
 class RepeatedDigits:
-    """Looks at how often each gauge has given the same digits."""
+    """A gauge is stuck if it repeats the same digits while others scatter.
+
+    It can be told of gauges whose noise is not below their resolution: of these each new sample differs from the one
+    before with a probability of 0.62 or more, wherever the value stands between two digits. A device that samples less
+    often than it is asked gives each sample several times; so the time without a change is compared with the usual one
+    between changes.
+
+    Looks at how often each gauge has given the same digits.
+    """
 
     def look(self, view: MachineView) -> Iterator[Contradiction]:
         memory = view.memory
@@ -119,7 +137,13 @@ _NEAR = 1.8
 
 
 class MeasuredScatter:
-    """Compares the scatter with the noise."""
+    """Scatter of each length at rest against its declared noise: one of them is wrong if they differ by a factor of 2.
+
+    A display with coarse digits scatters less than what it measures. So its smallest step counts as scatter, too,
+    before a noise is said to be declared too large.
+
+    Compares the scatter with the noise.
+    """
 
     def __init__(self) -> None:
         self._outside: set[int] = set()
@@ -147,7 +171,10 @@ LASTING_S = 0.5
 
 
 class JointPair:
-    """Compares Ra with Rb at each link; names the one that has moved further if they differ."""
+    """The two ball shanks of one revolute joint move together, but for the play of its axis.
+
+    Compares Ra with Rb at each link; names the one that has moved further if they differ.
+    """
 
     def __init__(self, largest_um: float) -> None:
         self._largest_um = largest_um
@@ -173,7 +200,10 @@ class JointPair:
 
 
 class FrameTemperature:
-    """Compares each frame distance with its thermal change since its first reading."""
+    """The frame grows with its temperature: a comparator that says otherwise drifts, or the frame has been hit.
+
+    Compares each frame distance with its thermal change since its first reading.
+    """
 
     def __init__(self, settings: FrameVote) -> None:
         self._settings = settings
