@@ -11,7 +11,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from compd.clock import MonotonicClock
 from compd.compensation import GaugeValues, WarmStart, compensate_cmm
 from compd.configuration import Configuration
 from compd.errors import Problem
@@ -19,6 +18,7 @@ from compd.gauge import good
 from compd.link_count import scale_count
 from compd.live.loop import Commands, CyclePacker, Directions, Loop, LoopTiming, Setpoint, build_pipeline
 from compd.live.machine import LiveModel, MachineWires, MachineZero, ModelLoader, Models, ModelText, try_model
+from compd.live.system import THIS_COMPUTER
 from compd.model import MachineModel
 
 _CYCLES = 200
@@ -43,7 +43,6 @@ def measure_cycle(configuration: Configuration) -> CycleTime:
 
     The model of `state.model_file` is in it. Raises CompdError if that cannot be used.
     """
-    clock = MonotonicClock()
     pipeline = build_pipeline(configuration, configuration.gauge_objects())
     latest, wires, settings = pipeline.latest, pipeline.wires, pipeline.settings
     model, zero = first_model(configuration, pipeline.loader), zero_of(configuration, wires)
@@ -58,14 +57,14 @@ def measure_cycle(configuration: Configuration) -> CycleTime:
         number = next(numbers)
         for channel, slot in latest.index.items():
             value = raw_value(zero, channel) + _NOISE_MM * (number % 3 - 1)
-            latest.put(slot, good(value, clock.monotonic()))
+            latest.put(slot, good(value, THIS_COMPUTER.monotonic()))
         return number < _CYCLES
 
     def send(setpoint: Setpoint) -> None:
         line, _ = setpoint.pack(None)
         packer.pack(setpoint, line)
 
-    Loop(settings, latest, commands, [send], clock, timing).run(keep_on)
+    Loop(settings, latest, commands, [send], THIS_COMPUTER, timing).run(keep_on)
     return CycleTime(timing.cost.quantile_us(0.5) * 1e-6, timing.cost.largest_us * 1e-6)
 
 

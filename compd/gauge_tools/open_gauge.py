@@ -20,6 +20,7 @@ from compd.lines import (
     Port,
     PortArguments,
     StreamLine,
+    WrappedPorts,
     explained,
     kinds_that_carry,
     open_line,
@@ -169,12 +170,12 @@ class TappedPushedLine:
 
 def open_tapped_line(settings: LineSettings, clock: Clock, listener: ByteListener) -> Line:
     """The line as the daemon opens it, with its bytes shown, but for ports that are within a library."""
-    return open_line(settings, clock, lambda port: TappedPort(port, listener))
+    return open_line(settings, clock, WrappedPorts(lambda port: TappedPort(port, listener)))
 
 
 def open_tapped_stream(settings: PolledLineSettings, clock: Clock, listener: ByteListener) -> StreamLine:
     """The byte stream of a line, with its bytes shown, whatever protocol runs over it."""
-    return open_stream(settings, clock, lambda port: TappedPort(port, listener))
+    return open_stream(settings, clock, WrappedPorts(lambda port: TappedPort(port, listener)))
 
 
 def read_gauge(target: GaugeTarget, clock: Clock, listener: ByteListener) -> Sequence[Reading]:

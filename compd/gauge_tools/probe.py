@@ -15,7 +15,7 @@ from compd.clock import MonotonicClock
 from compd.gauge import Gauge, LineFault, Quality, Reading
 from compd.gauge_tools.open_gauge import byte_line_settings, line_settings
 from compd.line_settings import powered
-from compd.lines import Port, PortArguments, StreamLine, explained, open_line, open_stream, shown
+from compd.lines import Port, PortArguments, StreamLine, WrappedPorts, explained, open_line, open_stream, shown
 from compd.plugins import GAUGES, load, names
 
 PROBE_TIMEOUT_S = 0.5
@@ -123,7 +123,9 @@ def probe_port(path: str, candidate: PresetCandidate) -> ProbeOutcome:
         )
         closing = not candidate.on_registers
         line = open_line(
-            powered(settings, [candidate.gauge]), MonotonicClock(), lambda port: _ClosedCommands(port, closing)
+            powered(settings, [candidate.gauge]),
+            MonotonicClock(),
+            WrappedPorts(lambda port: _ClosedCommands(port, closing)),
         )
         try:
             readings = candidate.gauge.read(line)

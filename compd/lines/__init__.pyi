@@ -18,6 +18,9 @@ from .open import polled_kind as polled_kind
 from .open import readable_definition as readable_definition
 from .port import Port as Port
 from .port_arguments import PortArguments as PortArguments
+from .ports import PORTS as PORTS
+from .ports import Ports as Ports
+from .ports import WrappedPorts as WrappedPorts
 from .stream import StreamLine as StreamLine
 from .stream import shown as shown
 from .usual_time import USUAL_SHARE as USUAL_SHARE

@@ -2,14 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import TYPE_CHECKING, Protocol
-
-if TYPE_CHECKING:
-    from compd.lines.port import Port
-
-# Puts another port around a line's own, for instance one that shows every byte.
-WrapPort = Callable[["Port"], "Port"]
+from typing import Protocol
 
 
 class Line(Protocol):
@@ -32,8 +25,3 @@ class Line(Protocol):
 
     def close(self) -> None:
         """Close the line."""
-
-
-def unchanged(port: Port) -> Port:
-    """The port itself."""
-    return port

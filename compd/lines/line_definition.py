@@ -22,7 +22,8 @@ from compd.lines.port_arguments import PortArguments
 
 if TYPE_CHECKING:
     from compd.line_settings import Pace
-    from compd.lines.line import Line, WrapPort
+    from compd.lines.line import Line
+    from compd.lines.ports import Ports
     from compd.lines.stream import StreamLine
     from compd.probes import Computer, Finding
     from compd.twins import PolledTwin, SimulatedPushedLine
@@ -49,7 +50,7 @@ class LineDefinition(ABC):
     example_key: ClassVar[str] = "pause_s=0.02"
 
     @abstractmethod
-    def open(self, settings: Any, clock: Clock, wrap_port: WrapPort) -> Line:
+    def open(self, settings: Any, clock: Clock, ports: Ports) -> Line:
         """The open line. Raises LineFault (LINE_LOST, with what the system said) when it cannot be opened."""
 
     @abstractmethod
@@ -96,12 +97,12 @@ class PolledDefinition(LineDefinition):
     def twin(self) -> PolledTwin:
         """The far end, as the simulated machine has it."""
 
-    def stream(self, settings: Any, clock: Clock, wrap_port: WrapPort) -> StreamLine:
+    def stream(self, settings: Any, clock: Clock, ports: Ports) -> StreamLine:
         """The line's stream of bytes, whatever is spoken over it. Raises LineFault as `open`, TypeError without one."""
         raise TypeError(f"a line of kind {self.kind} has no stream of bytes of its own")
 
-    def open(self, settings: Any, clock: Clock, wrap_port: WrapPort) -> Line:
-        return self.stream(settings, clock, wrap_port)
+    def open(self, settings: Any, clock: Clock, ports: Ports) -> Line:
+        return self.stream(settings, clock, ports)
 
     def bytes_on_wire(self, sent: int, received: int) -> tuple[int, int]:
         """Bytes there and back of an exchange that has so many in `Gauge.traffic`."""
@@ -147,7 +148,7 @@ class PushedDefinition(LineDefinition):
         Raises CompdError where one is needed and none is named.
         """
 
-    def open(self, settings: Any, clock: Clock, wrap_port: WrapPort) -> Line:
+    def open(self, settings: Any, clock: Clock, ports: Ports) -> Line:
         """The line; its port is within its library, and stays as it is."""
         try:
             return self.subscriber(settings, clock)

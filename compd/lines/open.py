@@ -13,8 +13,9 @@ from pydantic import Field
 from compd.clock import Clock
 from compd.line_settings import LineSettings, PolledLineSettings
 from compd.lines import kinds
-from compd.lines.line import Line, WrapPort, unchanged
+from compd.lines.line import Line
 from compd.lines.line_definition import LineDefinition, PolledDefinition
+from compd.lines.ports import PORTS, Ports
 
 if TYPE_CHECKING:
     from compd.lines.stream import StreamLine
@@ -63,19 +64,19 @@ def kinds_that_carry(carries: str) -> list[LineDefinition]:
     return [kind for kind in KINDS.values() if kind.carries == carries]
 
 
-def open_line(settings: LineSettings, clock: Clock, wrap_port: WrapPort = unchanged) -> Line:
+def open_line(settings: LineSettings, clock: Clock, ports: Ports = PORTS) -> Line:
     """Open a line of the settings' kind. After a LineFault with LINE_LOST, `close()` it and open a new one.
 
-    wrap_port : as in `open_stream`; ports that are within a library stay as they are.
+    ports : those of this computer, or others in their place; ports that are within a library stay as they are.
     Raises LineFault (LINE_LOST, with what the system said) when it cannot be opened.
     """
-    return definition_of(settings).open(settings, clock, wrap_port)
+    return definition_of(settings).open(settings, clock, ports)
 
 
-def open_stream(settings: PolledLineSettings, clock: Clock, wrap_port: WrapPort = unchanged) -> StreamLine:
+def open_stream(settings: PolledLineSettings, clock: Clock, ports: Ports = PORTS) -> StreamLine:
     """Open the stream of bytes of a line, whatever protocol is spoken over it.
 
-    wrap_port : puts another port around the line's own, for instance one that shows every byte.
+    ports : as in `open_line`.
     Raises LineFault (LINE_LOST, with what the system said) when it cannot be opened.
     """
-    return polled_definition(settings).stream(settings, clock, wrap_port)
+    return polled_definition(settings).stream(settings, clock, ports)

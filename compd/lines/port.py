@@ -62,6 +62,15 @@ class Port(Protocol):
         ...
 
 
+class NetworkPort(Port, Protocol):
+    """A port of a network."""
+
+    @property
+    def peer(self) -> str:
+        """Address and port of the other end; "" if the connection has ended."""
+        ...
+
+
 class SerialPort:
     """A serial port. All its parameters are set when it is opened; only DTR and break change while it is open."""
 
@@ -208,7 +217,6 @@ class TcpPort:
 
     @property
     def peer(self) -> str:
-        """Address and port of the other end; "" if the connection has ended."""
         try:
             address, port = self._socket.getpeername()[:2]
         except OSError:

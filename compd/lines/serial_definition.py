@@ -13,7 +13,7 @@ from compd.lines.port_arguments import PortArguments
 
 if TYPE_CHECKING:
     from compd.line_settings import SerialPortSettings
-    from compd.lines.line import WrapPort
+    from compd.lines.ports import Ports
     from compd.lines.stream import StreamLine
     from compd.probes import Computer, Finding
 
@@ -30,12 +30,11 @@ class SerialDefinition(PolledDefinition):
     example_key = "echo=true"
     rtu: ClassVar[bool] = False  #: whether it keeps the silences of Modbus RTU
 
-    def stream(self, settings: SerialPortSettings, clock: Clock, wrap_port: WrapPort) -> StreamLine:
+    def stream(self, settings: SerialPortSettings, clock: Clock, ports: Ports) -> StreamLine:
         from compd.lines.control_lines import ControlLines
-        from compd.lines.port import SerialPort
         from compd.lines.stream import StreamLine
 
-        port = SerialPort(
+        port = ports.serial(
             settings.port,
             settings.baud,
             settings.format,
@@ -44,7 +43,7 @@ class SerialDefinition(PolledDefinition):
             ControlLines(settings.dtr, settings.rts, settings.rs485),
         )
         quiet_s = max(QUIET_CHARACTERS * port.character_s, self.min_gap_s(settings), settings.pause_s)
-        return StreamLine(wrap_port(port), settings.timeout_s, quiet_s, clock, settings.echo)
+        return StreamLine(ports.of_stream(port), settings.timeout_s, quiet_s, clock, settings.echo)
 
     def min_gap_s(self, settings: SerialPortSettings) -> float:
         """Shortest silence before a request, s, whatever the time of a character is."""

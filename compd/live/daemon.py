@@ -12,14 +12,13 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 import structlog
 
-from compd.clock import Clock, MonotonicClock
 from compd.columns import COMMANDED_ATTITUDE_COLUMNS, COMMANDED_COLUMNS, MODEL_COLUMNS
 from compd.configuration import Configuration, listed_code
 from compd.errors import DaemonError, StateError
@@ -61,7 +60,7 @@ from compd.live.service import (
     ZeroCapture,
     machine_message,
 )
-from compd.live.system import changed_ports, port_names
+from compd.live.system import THIS_COMPUTER, System, changed_ports, port_names
 from compd.live.wired_trust import wired_channels, wired_memory, wired_trust
 from compd.model import MachineModel
 from compd.model.external import ExternalModel
@@ -81,21 +80,24 @@ class Daemon:
     period_s : of the loop.
     """
 
-    def __init__(self, configuration: Configuration, before: Daemon | None = None) -> None:
-        """`before`: the daemon whose place this one takes, and whose sockets it goes on with.
+    def __init__(
+        self, configuration: Configuration, before: Daemon | None = None, system: System = THIS_COMPUTER
+    ) -> None:
+        """`before`: the daemon whose place this one takes, and whose sockets it goes on with. `system`: on which its
+        processes run.
 
         Raises CompdError for whatever cannot be had: a socket, the model file, a geometry that is impossible. Nothing
         of `before` has changed then.
         """
-        clock = MonotonicClock()
         self.configuration = configuration
+        self._system = system
         gauges = configuration.gauge_objects()
         own_time = Histogram()
         pipeline = build_pipeline(
             configuration,
             gauges,
             listed_code(configuration.effects),
-            partial(TimedKinematics, cost=own_time, clock=clock),
+            partial(TimedKinematics, cost=own_time, clock=system),
         )
         self.period_s = pipeline.settings.period_s
         self.latest, self._wires = pipeline.latest, pipeline.wires
@@ -130,7 +132,7 @@ class Daemon:
             cycles,
             packet_hash,
             self.control,
-            clock,
+            system,
         )
         self.trust = self._trust(before)
         self._poll_requests = PollRequests(
@@ -140,9 +142,9 @@ class Daemon:
                 if not isinstance(configuration.lines[options.line], PushedLineSettings)
             ]
         )
-        self.acquisition = self._acquisition(gauges, self._votes(pipeline.settings.model), clock)
+        self.acquisition = self._acquisition(pipeline.settings.model)
         self._pipes = {name: os.pipe2(os.O_CLOEXEC) for name in ("loop", *(a.name for a in self.acquisition))}
-        watch = LoopWatch(self.setpoints, self.period_s, self.control.loop_fault.read, clock.monotonic())
+        watch = LoopWatch(self.setpoints, self.period_s, self.control.loop_fault.read, system.monotonic())
         observers = [StateLog(self.control).note]
         if packets is not None:
             observers.append(packets.deliver)
@@ -152,7 +154,7 @@ class Daemon:
             cycles=cycles,
             watch=watch,
             period_s=self.period_s,
-            clock=clock,
+            system=system,
             observers=observers,
             packet_hash=packet_hash,
         )
@@ -162,12 +164,12 @@ class Daemon:
             self.commands,
             Path(configuration.state.directory),
             configuration.zero_hash,
-            clock,
+            system,
             self.trust.accept,
             self.ports,
         )
         last_readings = LastReadings(
-            Path(configuration.state.directory), configuration.zero_hash, self.trust, clock, self.ports
+            Path(configuration.state.directory), configuration.zero_hash, self.trust, system, self.ports
         )
         self._changed_ports: Mapping[str, str] = {}
         if before is not None and before.trust is self.trust:
@@ -175,7 +177,7 @@ class Daemon:
         else:
             last_readings.recall()
         keeping = ModelKeeping(configuration.path, configuration.state.model_file).keys
-        model_switch = ModelSwitch(self.control, self.setpoints.wake_reader, clock, keeping)
+        model_switch = ModelSwitch(self.control, self.setpoints.wake_reader, system, keeping)
         version = VersionKeys.message(
             protocol=PROTOCOL,
             release=__version__,
@@ -198,7 +200,7 @@ class Daemon:
             packets=packets,
             lines=self._lines_status,
             trust=self.trust,
-            clock=clock,
+            clock=system,
             ports=self.ports,
         )
         requests = Requests(
@@ -216,7 +218,7 @@ class Daemon:
                 errands=Errands(
                     take_zero=zero_capture.start,
                     switch_model=model_switch.start,
-                    accept=Acceptance(self.trust, clock).start,
+                    accept=Acceptance(self.trust, system).start,
                     poll=self._poll_requests.add,
                     tell_order=publisher.tell_order,
                 ),
@@ -224,7 +226,7 @@ class Daemon:
                 target_keys=_target_keys(configuration),
                 targets=sockets.target,
                 access=access,
-                clock=clock,
+                clock=system,
             )
         )
         logs = {name: reading for name, (reading, _) in self._pipes.items()}
@@ -236,7 +238,7 @@ class Daemon:
             model_switch,
             packets,
             self.control,
-            clock,
+            system,
             logs,
             configuration.loop.priority // 2,
         )
@@ -270,46 +272,50 @@ class Daemon:
         self.loop_process.cycles.close()
         self.control.close()
 
-    def _acquisition(self, gauges: dict[str, Any], votes: Votes, clock: Clock) -> list[AcquisitionProcess]:
+    def _acquisition(self, model: MachineModel) -> list[AcquisitionProcess]:
         """One process for all lines but those that have one of their own; the first one looks at the votes."""
         configuration = self.configuration
-        trust = wired_trust(configuration, self._wires, self.trust)
         own = configuration.acquisition.own_process
-        on_line = {
-            line: [(name, gauges[name]) for name in gauges if configuration.gauges[name].line == line]
-            for line in configuration.lines
-        }
-        lines = {
-            line: (powered(configuration.lines[line], [gauge for _, gauge in named]), named)
-            for line, named in on_line.items()
-        }
-        stale_after_s = {
-            name: configuration.loop.stale_after_s if options.stale_after_s is None else options.stale_after_s
-            for name, options in configuration.gauges.items()
-        }
+        lines = configuration.lines
         groups = {"acquisition": [line for line in lines if line not in own]} | {f"line {line}": [line] for line in own}
         groups = {name: group for name, group in groups.items() if group}
         first = next(iter(groups), "")
         return [
             AcquisitionProcess(
                 name,
-                partial(
-                    Acquisition,
-                    {line: lines[line] for line in group},
-                    stale_after_s,
-                    self.latest,
-                    clock,
-                    trust=trust,
-                    poll_requests=self._poll_requests,
-                ),
+                partial(self._polling, group, model if name == first else None),
                 self.control,
-                clock,
+                self._system,
                 configuration.acquisition.memory_mb,
                 configuration.loop.priority // 4,
-                *([votes.look] if name == first else []),
             )
             for name, group in groups.items()
         ]
+
+    def _polling(self, group: Sequence[str], model: MachineModel | None) -> tuple[Acquisition, Callable[[float], None]]:
+        """What a process of the acquisition does with its lines: made in the process, so that each start is anew.
+
+        model : for the votes of the gauges; None where another process has them.
+        """
+        configuration, gauges = self.configuration, self.configuration.gauge_objects()
+        on_line = {
+            line: [(name, gauges[name]) for name in gauges if configuration.gauges[name].line == line] for line in group
+        }
+        acquisition = Acquisition(
+            {
+                line: (powered(configuration.lines[line], [gauge for _, gauge in named]), named)
+                for line, named in on_line.items()
+            },
+            {
+                name: configuration.loop.stale_after_s if options.stale_after_s is None else options.stale_after_s
+                for name, options in configuration.gauges.items()
+            },
+            self.latest,
+            self._system,
+            trust=wired_trust(configuration, self._wires, self.trust),
+            poll_requests=self._poll_requests,
+        )
+        return acquisition, (lambda now_s: None) if model is None else self._votes(model).look
 
     def _votes(self, model: MachineModel) -> Votes:
         """What the gauges say of each other."""
@@ -354,7 +360,7 @@ class Daemon:
     def _first_zero(self) -> MachineZero | StateError:
         configuration, wires = self.configuration, self._wires
         directory, has_gauges = Path(configuration.state.directory), bool(wires.all_wires)
-        return zero_at_start(directory, configuration.zero_hash, wires.length_channels, has_gauges)
+        return zero_at_start(directory, configuration.zero_hash, wires.length_channels, has_gauges, self._system)
 
 
 def model_columns(model: MachineModel, configuration: Configuration) -> tuple[tuple[str, ...], tuple[float, ...]]:

@@ -7,9 +7,8 @@ from typing import Any
 
 import structlog
 
-from compd.clock import Clock
 from compd.live.processes import LoopProcess, ModelChange
-from compd.live.system import ChildProcess
+from compd.live.system import ChildProcess, System
 
 # For reading a model file and trying it; imports of an effect's author may take seconds.
 READY_WITHIN_S = 15.0
@@ -20,11 +19,11 @@ _log = structlog.get_logger()
 class LoopSuccession:
     """Starts loops, and knows which of them is the daemon's; used by the supervisor."""
 
-    def __init__(self, process: LoopProcess, clock: Clock, output: int | None) -> None:
+    def __init__(self, process: LoopProcess, system: System, output: int | None) -> None:
         """`output`: where the loops' log goes."""
         self._process = process
         self._control = process.control
-        self._clock = clock
+        self._system = system
         self._output = output
         self._number = 0
         self._starts = 0
@@ -118,4 +117,4 @@ class LoopSuccession:
         return self._number
 
     def _child(self, name: str, run: Callable[[], None]) -> ChildProcess:
-        return ChildProcess(name, run, self._clock, self._output, keeps_sockets=False)
+        return ChildProcess(name, run, self._system, self._output, keeps_sockets=False)

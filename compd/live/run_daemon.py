@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import structlog
 
-from compd.clock import MonotonicClock
 from compd.configuration import Configuration
 from compd.errors import CompdError
 from compd.live.daemon import Daemon
 from compd.live.supervisor import Ending, Supervisor
-from compd.live.system import Journal, Notifier, name_event
+from compd.live.system import THIS_COMPUTER, Journal, Notifier, System, name_event
 from compd.log import hide_secrets_of_libraries, log_to_stderr
 from compd.machine_check import load_whole
 from compd.text import hide_secrets
@@ -18,18 +17,23 @@ _log = structlog.get_logger()
 
 
 def run(configuration: Configuration) -> bool:
-    """Run the daemon until SIGTERM or Ctrl-C; True where it ended by itself.
+    """Log to stderr, and run the daemon until SIGTERM or Ctrl-C; True where it ended by itself.
 
     Raises CompdError where it cannot start: a socket that cannot be had, a model file that cannot be used.
     """
     _log_to_stderr()
-    notifier, clock = Notifier.from_environment(), MonotonicClock()
-    daemon = Daemon(configuration)
+    return run_daemon(configuration, THIS_COMPUTER)
+
+
+def run_daemon(configuration: Configuration, system: System) -> bool:
+    """Run the daemon on a computer; see `run`."""
+    notifier = Notifier.from_environment()
+    daemon = Daemon(configuration, system=system)
     while True:
         _report(daemon)
         daemon.take_over()
-        successor = _Successor(daemon)
-        ending = Supervisor(daemon, notifier, clock).run(successor.check, successor.make)
+        successor = _Successor(daemon, system)
+        ending = Supervisor(daemon, notifier, system).run(successor.check, successor.make)
         if ending is not Ending.RELOADED or successor.daemon is None:
             daemon.close()
             notifier.close()
@@ -41,9 +45,10 @@ def run(configuration: Configuration) -> bool:
 class _Successor:
     """The daemon of the configuration as its file is at SIGHUP."""
 
-    def __init__(self, now: Daemon) -> None:
+    def __init__(self, now: Daemon, system: System) -> None:
         self.daemon: Daemon | None = None  #: None until it has been made
         self._now = now
+        self._system = system
 
     def check(self) -> None:
         """Make it in a process of its own, which shows whether it can be made; exit code 2 where it cannot."""
@@ -53,7 +58,7 @@ class _Successor:
     def make(self) -> bool:
         """Whether it could be made; every problem is in the log where it could not."""
         try:
-            self.daemon = Daemon(load_whole(self._now.configuration.path), self._now)
+            self.daemon = Daemon(load_whole(self._now.configuration.path), self._now, self._system)
         except CompdError as error:
             for problem in error.problems:
                 _log.error("configuration refused", problem=str(problem))

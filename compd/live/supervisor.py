@@ -9,19 +9,18 @@ import math
 import os
 import selectors
 import signal
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import Callable
+from contextlib import suppress
 from enum import Enum, auto
 from typing import Any
 
 import structlog
 
-from compd.clock import Clock
 from compd.live.daemon import Daemon
 from compd.live.loop_succession import LoopSuccession
 from compd.live.memory import Phase
 from compd.live.processes import Heartbeat, ModelChange, RestartDelay
-from compd.live.system import ChildProcess, Notifier
+from compd.live.system import SIGNALS, ChildProcess, Notifier, System
 
 # Between two looks at the beats of the processes.
 LOOK_EVERY_S = 0.1
@@ -30,7 +29,6 @@ _LOOP_LOOKS, _SERVICE_LOOKS, _ACQUISITION_LOOKS = 5, 20, 20
 # How long the correction is held for the clients to see, and how long everything may then take to end.
 _HOLD_S = 0.2
 _END_WITHIN_S = 1.0
-_SIGNALS = (signal.SIGTERM, signal.SIGINT, signal.SIGHUP)
 
 _log = structlog.get_logger()
 
@@ -46,19 +44,19 @@ class Ending(Enum):
 class Supervisor:
     """Supervises the processes of one daemon."""
 
-    def __init__(self, daemon: Daemon, notifier: Notifier, clock: Clock) -> None:
+    def __init__(self, daemon: Daemon, notifier: Notifier, system: System) -> None:
         self._daemon = daemon
         self._control = daemon.control
         self._notifier = notifier
-        self._clock = clock
-        self._loops = LoopSuccession(daemon.loop_process, clock, daemon.log_pipe("loop"))
+        self._system = system
+        self._loops = LoopSuccession(daemon.loop_process, system, daemon.log_pipe("loop"))
         self._acquisition = {
             process.name: ChildProcess(
-                process.name, process.run, clock, daemon.log_pipe(process.name), keeps_sockets=False
+                process.name, process.run, system, daemon.log_pipe(process.name), keeps_sockets=False
             )
             for process in daemon.acquisition
         }
-        self._service = ChildProcess("service", daemon.service.run, clock)
+        self._service = ChildProcess("service", daemon.service.run, system)
         loop_looks = max(_LOOP_LOOKS, math.ceil(_LOOP_LOOKS * daemon.period_s / LOOK_EVERY_S))
         self._loop_heart = Heartbeat(loop_looks)
         self._service_heart = Heartbeat(_SERVICE_LOOKS)
@@ -75,8 +73,8 @@ class Supervisor:
         check : called at SIGHUP in a process of its own, since code of a driver's author runs there; raises where the
             configuration cannot be used. reload : called when it could; whether the daemon is to end for it.
         """
-        self._check = ChildProcess("check", check, self._clock, keeps_sockets=True)
-        with _signals() as signals:
+        self._check = ChildProcess("check", check, self._system, keeps_sockets=True)
+        with self._system.signals() as signals:
             for child in self._acquisition.values():
                 child.start()
             self._loops.start()
@@ -89,7 +87,7 @@ class Supervisor:
                 self._kill_all()
 
     def _supervise(self, signals: int, reload: Callable[[], bool]) -> Ending:
-        next_look_s = self._clock.monotonic()
+        next_look_s = self._system.monotonic()
         while True:
             self._wait(signals, next_look_s)
             for number in _received(signals):
@@ -102,7 +100,7 @@ class Supervisor:
                 if not self._check.running:
                     self._check.start()
             if self._check.running and self._check.collect() and self._is_good(reload):
-                self._notifier.reloading(self._clock.monotonic())
+                self._notifier.reloading(self._system.monotonic())
                 self._end("compd starts anew with another configuration")
                 return Ending.RELOADED
             self._collect()
@@ -110,7 +108,7 @@ class Supervisor:
                 _log.error("the service has ended, and with it the daemon", how=self._service.last_end)
                 return Ending.FAILED
             self._pass_on()
-            now_s = self._clock.monotonic()
+            now_s = self._system.monotonic()
             if now_s >= next_look_s:
                 next_look_s = now_s + LOOK_EVERY_S
                 self._look(now_s)
@@ -120,10 +118,10 @@ class Supervisor:
         """Until a signal, the end of a process, a wish of the service, a restart that is due, or `until_s`."""
         delays = [self._loop_delay, *self._acquisition_delays.values()]
         due_s = min([until_s, *(delay.due_s for delay in delays)])
-        with selectors.PollSelector() as selector:
+        with self._system.selector() as selector:
             for descriptor in (signals, self._control.supervisor_woken, *(child.pidfd for child in self._running())):
                 selector.register(descriptor, selectors.EVENT_READ)
-            selector.select(max(due_s - self._clock.monotonic(), 0.0))
+            selector.select(max(due_s - self._system.monotonic(), 0.0))
 
     def _running(self) -> list[ChildProcess]:
         children = [*self._loops.children, self._service, *self._acquisition.values(), self._check]
@@ -138,7 +136,7 @@ class Supervisor:
 
     def _collect(self) -> None:
         """Note which processes have ended, and when they are to be started anew."""
-        now_s = self._clock.monotonic()
+        now_s = self._system.monotonic()
         self._service.collect()
         if self._loops.collect(self._request):
             self._loop_delay.ended(self._loops.loop.started_s, now_s)
@@ -228,9 +226,9 @@ class Supervisor:
 
     def _wait_for_ends(self, within_s: float) -> None:
         """Until all processes have ended, or `within_s` seconds have passed."""
-        end_s = self._clock.monotonic() + within_s
-        while (running := self._running()) and (left_s := end_s - self._clock.monotonic()) > 0:
-            with selectors.PollSelector() as selector:
+        end_s = self._system.monotonic() + within_s
+        while (running := self._running()) and (left_s := end_s - self._system.monotonic()) > 0:
+            with self._system.selector() as selector:
                 for child in running:
                     selector.register(child.pidfd, selectors.EVENT_READ)
                 selector.select(left_s)
@@ -245,27 +243,8 @@ class Supervisor:
             child.wait()
 
 
-@contextmanager
-def _signals() -> Iterator[int]:
-    """A descriptor from which the numbers of SIGTERM, SIGINT and SIGHUP can be read, one byte each.
-
-    A signal that stops the process, or lets it continue, is none of these and ends no wait.
-    """
-    reading, writing = os.pipe2(os.O_NONBLOCK | os.O_CLOEXEC)
-    before = [signal.signal(number, lambda *_: None) for number in _SIGNALS]
-    wakeup_before = signal.set_wakeup_fd(writing, warn_on_full_buffer=False)
-    try:
-        yield reading
-    finally:
-        signal.set_wakeup_fd(wakeup_before)
-        for number, handler in zip(_SIGNALS, before, strict=True):
-            signal.signal(number, handler)
-        os.close(reading)
-        os.close(writing)
-
-
 def _received(signals: int) -> list[int]:
     try:
-        return [number for number in os.read(signals, 64) if number in _SIGNALS]
+        return [number for number in os.read(signals, 64) if number in SIGNALS]
     except BlockingIOError:
         return []

@@ -13,10 +13,9 @@ from typing import Any
 
 import structlog
 
-from compd.clock import Clock
 from compd.gauge import Gauge, LineFault, Quality
 from compd.line_settings import LineSettings, PolledLineSettings
-from compd.lines import Line, open_line
+from compd.lines import Line, Ports, open_line
 from compd.live.acquisition.gauge_trust import Judge
 from compd.live.acquisition.polled_gauge import BackOff, PolledGauge
 from compd.live.acquisition.polled_round import PolledRound
@@ -24,13 +23,13 @@ from compd.live.acquisition.pushed_round import PushedRound
 from compd.live.acquisition.round_trigger import RoundBuffer
 from compd.live.acquisition.shared_endpoints import Peers
 from compd.live.memory import Latest, PollRequests
-from compd.live.system import sharpen_timers
+from compd.live.system import System
 
 log = structlog.get_logger()
 
 _NO_TRUST: Mapping[str, Judge] = {}
 # Opens a line from its settings; raises LineFault (LINE_LOST) where it cannot.
-Opener = Callable[[Any, Clock], Line]
+Opener = Callable[[Any, System, Ports], Line]
 
 
 class LineThread:
@@ -43,7 +42,7 @@ class LineThread:
         gauges: Sequence[tuple[str, Gauge[Any]]],
         stale_after_s: Mapping[str, float],
         latest: Latest,
-        clock: Clock,
+        system: System,
         opener: Opener = open_line,
         trust: Mapping[str, Judge] = _NO_TRUST,
         peers: Peers | None = None,
@@ -63,11 +62,11 @@ class LineThread:
         buffer = None if settings.round_trigger is None else RoundBuffer(latest)
         #: the line's gauges, with the counts of their polls and faults
         self.gauges = [
-            PolledGauge(gauge, driver, buffer or latest, settings.timeout_s, stale_after_s[gauge], clock, trust)
+            PolledGauge(gauge, driver, buffer or latest, settings.timeout_s, stale_after_s[gauge], system, trust)
             for gauge, driver in gauges
         ]
         self._settings = settings
-        self._clock = clock
+        self._system = system
         self._opener = opener
         self._peers = Peers() if peers is None else peers
         self._line: Any = None  # a Line; of another kind for each driver
@@ -76,10 +75,10 @@ class LineThread:
         self._round: PolledRound | PushedRound
         if isinstance(settings, PolledLineSettings):
             requests = PollRequests() if poll_requests is None else poll_requests
-            self._round = PolledRound(self.gauges, settings, buffer, clock, self._stop, self._back_off, requests)
+            self._round = PolledRound(self.gauges, settings, buffer, system, self._stop, self._back_off, requests)
         else:
-            self._round = PushedRound(self.gauges, stale_after_s, clock, self._back_off)
-        self._thread = threading.Thread(target=self._run, name=f"line {name}", daemon=True)
+            self._round = PushedRound(self.gauges, stale_after_s, system, self._back_off)
+        self._thread = system.thread(self._run, f"line {name}")
 
     def start(self) -> None:
         """Start polling and return at once, even if the line cannot be opened yet."""
@@ -113,10 +112,10 @@ class LineThread:
         return status
 
     def _run(self) -> None:
-        sharpen_timers()
+        self._system.privileges.sharpen_timers()
         while not self._stop.is_set():
             try:
-                self._line = self._opener(self._settings, self._clock)
+                self._line = self._opener(self._settings, self._system, self._system.ports)
                 self._mark_open()
                 while not self._stop.is_set():
                     self._round.take(self._line)
@@ -131,7 +130,7 @@ class LineThread:
             finally:
                 self._close()
             if not self._stop.is_set():
-                self._clock.wait(self._stop, self._back_off.failed())
+                self._system.wait(self._stop, self._back_off.failed())
         self.state = "stopped"
 
     def _mark_open(self) -> None:
@@ -150,7 +149,7 @@ class LineThread:
             log.warning("line is lost", line=self.name, detail=detail)
         self.state, self.detail = "lost", detail
         for gauge in self.gauges:
-            gauge.lose(Quality.LINE_LOST, detail, self._clock.monotonic())
+            gauge.lose(Quality.LINE_LOST, detail, self._system.monotonic())
         self._round.lost()
 
     def _close(self) -> None:
@@ -172,7 +171,7 @@ class Acquisition:
         lines: Mapping[str, tuple[LineSettings, Sequence[tuple[str, Gauge[Any]]]]],
         stale_after_s: Mapping[str, float],
         latest: Latest,
-        clock: Clock,
+        system: System,
         opener: Opener = open_line,
         trust: Mapping[str, Judge] = _NO_TRUST,
         poll_requests: PollRequests | None = None,
@@ -184,7 +183,7 @@ class Acquisition:
         """
         peers = Peers()
         self.lines = {
-            name: LineThread(name, settings, gauges, stale_after_s, latest, clock, opener, trust, peers, poll_requests)
+            name: LineThread(name, settings, gauges, stale_after_s, latest, system, opener, trust, peers, poll_requests)
             for name, (settings, gauges) in lines.items()
         }
 

@@ -5,14 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 
-from compd.clock import Clock
 from compd.live.loop.commands import Commands
 from compd.live.loop.cycle import step
 from compd.live.loop.cycle_state import CycleInputs, CycleSettings, CycleState
 from compd.live.loop.setpoint import Setpoint
 from compd.live.loop.timing import LoopTiming
 from compd.live.memory import Latest
-from compd.live.system import QuietCollector, sleep_until
+from compd.live.system import System
 
 
 class Loop:
@@ -24,19 +23,17 @@ class Loop:
         latest: Latest,
         commands: Commands,
         sinks: Sequence[Callable[[Setpoint], None]],
-        clock: Clock,
+        system: System,
         timing: LoopTiming | None = None,
-        sleep_until: Callable[[float], None] = sleep_until,
     ) -> None:
         """`sinks` take every setpoint, and must not wait. `timing`: where the loops of other processes go on."""
         self.timing = timing or LoopTiming(cycle.period_s)
-        self.collector = QuietCollector()
+        self.collector = system.privileges.quiet_collector()
         self._cycle = cycle
         self._latest = latest
         self._commands = commands
         self._sinks = tuple(sinks)
-        self._clock = clock
-        self._sleep_until = sleep_until
+        self._system = system
 
     def run(
         self, keep_on: Callable[[], bool], ending: Callable[[], str] = lambda: "", state: CycleState | None = None
@@ -50,15 +47,15 @@ class Loop:
         ending : why the correction is to be held, or "".
         state : what the last cycle left; None before the first one.
         """
-        cycle, commands, clock, timing = self._cycle, self._commands, self._clock, self.timing
+        cycle, commands, system, timing = self._cycle, self._commands, self._system, self.timing
         period_s = timing.period_s
         state = state or CycleState.at_start(cycle.model)
-        tick = timing.begin(clock.monotonic())
+        tick = timing.begin(system.monotonic())
         origin_s = timing.origin_s
         while keep_on():
             wake_s = origin_s + tick * period_s
-            self._sleep_until(wake_s)
-            start_s = clock.monotonic()
+            system.sleep_until(wake_s)
+            start_s = system.monotonic()
             if late := int((start_s - wake_s) / period_s):  # this process was stopped, or the machine was
                 timing.note_missed(late)
                 tick += late
@@ -69,7 +66,7 @@ class Loop:
             setpoint, state = step(state, inputs, cycle)
             for sink in self._sinks:
                 sink(setpoint)
-            end_s = clock.monotonic()
+            end_s = system.monotonic()
             next_tick = max(tick + 1, math.ceil((end_s - origin_s) / period_s))
             timing.note_end(tick, start_s, end_s, missed=next_tick - tick - 1)
             tick = next_tick

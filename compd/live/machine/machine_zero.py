@@ -6,7 +6,6 @@ import json
 from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, Literal
 
@@ -14,7 +13,8 @@ import structlog
 from pydantic import BaseModel, ConfigDict, FiniteFloat, ValidationError
 
 from compd.errors import Problem, StateError
-from compd.files import CHECKSUM, FileKind, checksum_of, read_small_file, write_files
+from compd.files import CHECKSUM, FileKind, checksum_of
+from compd.live.system import THIS_COMPUTER, System
 
 FILE_NAME = "machine-zero.json"
 # The machine zero before the present one, as its file was.
@@ -86,7 +86,7 @@ class MachineZero:
             if channel in before.readings_mm
         }
 
-    def save(self, directory: Path) -> Path:
+    def save(self, directory: Path, system: System = THIS_COMPUTER) -> Path:
         """Write the file in this directory, and return its path. After a power cut it is the old one or the new one.
 
         The file that was there stays beside it as OLD_FILE_NAME. Raises StateError when the disk refuses.
@@ -96,7 +96,7 @@ class MachineZero:
         text = json.dumps(content, indent=1, allow_nan=False) + "\n"
         try:
             directory.mkdir(parents=True, exist_ok=True)
-            write_files({**_old_file(directory), path: text})
+            system.write_files({**_old_file(directory, system), path: text})
         except OSError as error:
             raise StateError.of(
                 str(path),
@@ -106,19 +106,19 @@ class MachineZero:
         return path
 
 
-def _old_file(directory: Path) -> dict[Path, bytes]:
+def _old_file(directory: Path, system: System) -> dict[Path, bytes]:
     """The machine zero in this directory until now, to be kept: path and content; nothing where there is none.
 
     Raises OSError where it is there and cannot be kept.
     """
     try:
-        return {directory / OLD_FILE_NAME: read_small_file(directory / FILE_NAME, _MAX_FILE_BYTES)}
+        return {directory / OLD_FILE_NAME: system.read_file(directory / FILE_NAME, _MAX_FILE_BYTES)}
     except FileNotFoundError:
         return {}
 
 
 def zero_at_start(
-    directory: Path, zero_hash: str, channels: tuple[str, ...], has_gauges: bool
+    directory: Path, zero_hash: str, channels: tuple[str, ...], has_gauges: bool, system: System = THIS_COMPUTER
 ) -> MachineZero | StateError:
     """The machine zero on disk, or why there is none: the daemon runs without one, so that it can be taken.
 
@@ -127,19 +127,21 @@ def zero_at_start(
     zero_hash, channels : as of `load_zero`.
     """
     try:
-        zero = load_zero(directory, zero_hash, channels)
+        zero = load_zero(directory, zero_hash, channels, system)
     except StateError as error:
         if has_gauges:
             log.warning("no machine zero", reason=str(error))
             return error
-        zero = MachineZero(zero_hash, datetime.now(UTC).isoformat(timespec="seconds"), {})
+        zero = MachineZero(zero_hash, system.utc().isoformat(timespec="seconds"), {})
         with suppress(StateError):  # without a disk it is another one after the next start
-            zero.save(directory)
+            zero.save(directory, system)
     log.info("machine zero", taken_at=zero.taken_at)
     return zero
 
 
-def load_zero(directory: Path, zero_hash: str, channels: tuple[str, ...]) -> MachineZero:
+def load_zero(
+    directory: Path, zero_hash: str, channels: tuple[str, ...], system: System = THIS_COMPUTER
+) -> MachineZero:
     """The machine zero in the file in this directory.
 
     Parameters
@@ -155,7 +157,7 @@ def load_zero(directory: Path, zero_hash: str, channels: tuple[str, ...]) -> Mac
     """
     path = directory / FILE_NAME
     try:
-        content = json.loads(read_small_file(path, _MAX_FILE_BYTES).decode())
+        content = json.loads(system.read_file(path, _MAX_FILE_BYTES).decode())
     except FileNotFoundError as error:
         raise StateError.of(str(path), "machine zero has never been taken", next_step=_TAKE_ONE) from error
     except OSError as error:

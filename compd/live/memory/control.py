@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import os
-import select
+from collections.abc import Callable
 from enum import IntEnum
+from selectors import EVENT_READ, BaseSelector
 
 from compd.documents import MAX_BYTES
 from compd.live.memory.shared_array import shared_counters
@@ -81,16 +82,16 @@ class Control:
         """Number of the loop that is ready to take over; 0 where there is none."""
         return self._words[_SUCCESSOR]
 
-    def await_turn(self, loop: int, timeout_s: float) -> bool:
+    def await_turn(self, loop: int, timeout_s: float, selector: Callable[[], BaseSelector]) -> bool:
         """Offer to take over as this loop, and wait for the turn; False where it has not come."""
         self._words[_SUCCESSOR] = loop
-        poll = select.poll()
-        poll.register(self.turn_given, select.POLLIN)
-        while self.turn != loop:
-            if not poll.poll(timeout_s * 1e3):
-                self.withdraw(loop)
-                return self.turn == loop
-            os.eventfd_read(self.turn_given)
+        with selector() as waiting:
+            waiting.register(self.turn_given, EVENT_READ)
+            while self.turn != loop:
+                if not waiting.select(timeout_s):
+                    self.withdraw(loop)
+                    return self.turn == loop
+                os.eventfd_read(self.turn_given)
         return True
 
     def withdraw(self, loop: int) -> None:

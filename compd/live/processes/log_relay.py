@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 import os
-import select
 import threading
 from collections.abc import Callable, Iterator, Mapping
+from selectors import EVENT_READ
 
 import structlog
 
-from compd.clock import Clock
+from compd.live.system import System
 
 # Limits of a process's log: lines per second on average, and lines at once after a quiet time.
 LINES_PER_S = 50.0
@@ -65,18 +65,18 @@ class LogRelay:
     close, after `stop`.
     """
 
-    def __init__(self, sources: Mapping[str, int], write: Callable[[str], None], clock: Clock) -> None:
+    def __init__(self, sources: Mapping[str, int], write: Callable[[str], None], system: System) -> None:
         """`sources`: read end of each pipe by the name of its process. `write` gets one line at a time, with its end;
         where it raises OSError or ValueError, the line is lost and nothing else."""
         self._sources = {descriptor: _Source(name) for name, descriptor in sources.items()}
         self._write = write
-        self._clock = clock
+        self._system = system
         self._stop = threading.Event()
         self._wake = os.eventfd(0, os.EFD_NONBLOCK | os.EFD_CLOEXEC)
-        self._poll = select.poll()
+        self._selector = system.selector()
         for descriptor in (*self._sources, self._wake):
-            self._poll.register(descriptor, select.POLLIN)
-        self._thread = threading.Thread(target=self._run, name="log relay", daemon=True)
+            self._selector.register(descriptor, EVENT_READ)
+        self._thread = system.thread(self._run, "log relay")
 
     def start(self) -> None:
         """Start the thread."""
@@ -89,6 +89,7 @@ class LogRelay:
         if self._thread.ident is not None:
             self._thread.join(_STOP_TIMEOUT_S)
         if not self._thread.is_alive():
+            self._selector.close()
             os.close(self._wake)
 
     def round(self, timeout_s: float | None = 0.0) -> None:
@@ -96,9 +97,9 @@ class LogRelay:
 
         Called by the thread, and by tests in its place.
         """
-        ready = self._poll.poll(None if timeout_s is None else math.ceil(timeout_s * 1e3))
-        now_s = self._clock.monotonic()
-        for descriptor, _ in ready:
+        ready = [key.fd for key, _ in self._selector.select(timeout_s)]
+        now_s = self._system.monotonic()
+        for descriptor in ready:
             if descriptor != self._wake:
                 self._relay(descriptor, now_s)
         for source in self._sources.values():
@@ -109,10 +110,10 @@ class LogRelay:
     def _run(self) -> None:
         while not self._stop.is_set():
             self.round(self._longest_wait_s())
-            self._clock.wait(self._stop, ROUND_S)
+            self._system.wait(self._stop, ROUND_S)
         for _ in range(_LAST_ROUNDS):
             self.round()
-        now_s = self._clock.monotonic()
+        now_s = self._system.monotonic()
         for source in self._sources.values():
             self._send(source.last_line(now_s))
             if source.dropped:
@@ -121,7 +122,7 @@ class LogRelay:
     def _longest_wait_s(self) -> float | None:
         """Time until a number of dropped lines is to be reported, s; None where there is none."""
         due_s = min((source.report_due_s for source in self._sources.values() if source.dropped), default=None)
-        return None if due_s is None else max(0.0, due_s - self._clock.monotonic())
+        return None if due_s is None else max(0.0, due_s - self._system.monotonic())
 
     def _relay(self, descriptor: int, now_s: float) -> None:
         source = self._sources[descriptor]
@@ -132,7 +133,7 @@ class LogRelay:
         if data:
             self._send(source.lines(data, now_s))
         else:  # the end, which would be found again and again
-            self._poll.unregister(descriptor)
+            self._selector.unregister(descriptor)
             self._send(source.last_line(now_s))
 
     def _send(self, lines: Iterator[str]) -> None:

@@ -11,7 +11,6 @@ from dataclasses import dataclass
 
 import structlog
 
-from compd.clock import Clock
 from compd.errors import CompdError, StateError
 from compd.live.loop import (
     AdoptedModels,
@@ -29,7 +28,7 @@ from compd.live.loop import (
 )
 from compd.live.machine import LiveModel, MachineZero, ModelLoader, Models, ModelText, warn_of_datum
 from compd.live.memory import Control, Latest, SharedRing
-from compd.live.system import limit_wake_latency, lock_memory, sharpen_timers, use_fifo
+from compd.live.system import System
 from compd.operation_settings import LoopSettings
 
 # Cycles that a loop computes before the first that counts.
@@ -88,7 +87,7 @@ class LoopProcess:
     cycles: SharedRing
     packet_hash: bytes | None
     control: Control
-    clock: Clock
+    system: System
 
     def run(self, number: int, forget: bool = False) -> None:
         """Cycle as loop `number`, which has the turn. forget : begin anew but for the correction that is applied."""
@@ -97,7 +96,7 @@ class LoopProcess:
         loop = self._loop()
         self._prepare(loop)
         self._try_cycles(self._state_left(models, forget))
-        use_fifo(self.settings.loop.priority)
+        self.system.privileges.use_fifo(self.settings.loop.priority)
         loop.run(lambda: self.control.keeps_turn(number), self.control.ending, self._state_left(models, forget))
 
     def run_successor(self, number: int, request: ModelChange) -> None:
@@ -117,8 +116,8 @@ class LoopProcess:
             _log.warning("model refused", file=request.name, reason=reason)
             self.answer(request.number, None, reason)
             return
-        use_fifo(self.settings.loop.priority)
-        if not control.await_turn(number, _TURN_WITHIN_S):
+        self.system.privileges.use_fifo(self.settings.loop.priority)
+        if not control.await_turn(number, _TURN_WITHIN_S, self.system.selector):
             self.answer(request.number, None, "the loop does not answer")
             return
         state = self._state_left(before, forget=False)
@@ -160,20 +159,20 @@ class LoopProcess:
             self.setpoints.put(time_s, state, content)
             self.cycles.put(time_s, state, packer.pack(setpoint, line))
 
-        return Loop(self.settings, self.latest, self.commands, [send], self.clock, self.timing)
+        return Loop(self.settings, self.latest, self.commands, [send], self.system, self.timing)
 
     def _prepare(self, loop: Loop) -> None:
         """Ask the system for what real time needs. What it does not permit is told, and the loop runs without it."""
-        settings = self.settings.loop
-        sharpen_timers()
-        permissions = {"quiet_collector": loop.collector.start(self.clock.monotonic())}
+        settings, privileges = self.settings.loop, self.system.privileges
+        privileges.sharpen_timers()
+        permissions = {"quiet_collector": loop.collector.start(self.system.monotonic())}
         if settings.lock_memory:
-            permissions["locked_memory"] = lock_memory()
+            permissions["locked_memory"] = privileges.lock_memory()
         if (latency_us := wake_latency_us(settings)) is not None:
-            permissions["wake_latency"] = limit_wake_latency(latency_us)
-        permissions["sched_fifo"] = use_fifo(settings.priority)
+            permissions["wake_latency"] = privileges.limit_wake_latency(latency_us)
+        permissions["sched_fifo"] = privileges.use_fifo(settings.priority)
         # what follows must not get in the way of the loop that has the turn
-        use_fifo(_TRIAL_PRIORITY)
+        privileges.use_fifo(_TRIAL_PRIORITY)
         self.control.realtime.write({name: permission._asdict() for name, permission in permissions.items()})
 
     def _try_cycles(self, state: CycleState) -> None:
@@ -187,7 +186,7 @@ class LoopProcess:
                 raise ValueError(f"a cycle, with what its effects remember, has more than {most} bytes")
 
     def _inputs(self, tick: int) -> CycleInputs:
-        snapshot = self.latest.snapshot(self.clock.monotonic())
+        snapshot = self.latest.snapshot(self.system.monotonic())
         return CycleInputs(tick, snapshot, self.commands.zero, self.commands.target, self.commands.models)
 
     def _state_left(self, models: Models, forget: bool) -> CycleState:

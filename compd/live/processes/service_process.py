@@ -8,12 +8,11 @@ from dataclasses import dataclass
 
 import structlog
 
-from compd.clock import Clock
 from compd.live.loop import Setpoint
 from compd.live.memory import Control, Phase
 from compd.live.processes.log_relay import LogRelay
 from compd.live.service import LastReadings, ModelSwitch, Publisher, Requests, UdpSender, ZeroCapture
-from compd.live.system import Journal, RationedPriority, sharpen_timers, shorten_switch_interval
+from compd.live.system import Journal, System
 from compd.setpoint_states import State
 
 # Characters. A reason that names every gauge of a machine has thousands; the log has it whole.
@@ -56,19 +55,20 @@ class ServiceProcess:
     model_switch: ModelSwitch
     packets: UdpSender | None
     control: Control
-    clock: Clock
+    system: System
     logs: Mapping[str, int]
     priority: int
 
     def run(self) -> None:
         """Serve until the daemon stops."""
         journal = Journal.from_environment()
-        relay = LogRelay(self.logs, _write if journal is None else journal.write, self.clock)
+        relay = LogRelay(self.logs, _write if journal is None else journal.write, self.system)
         relay.start()
         self.last_readings.start()
-        shorten_switch_interval()
-        sharpen_timers()
-        priority = RationedPriority(self.priority, self.clock)
+        privileges = self.system.privileges
+        privileges.shorten_switch_interval()
+        privileges.sharpen_timers()
+        priority = privileges.rationed_priority(self.priority, self.system)
 
         def each_round() -> None:
             self.control.beat_service()

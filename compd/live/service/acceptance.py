@@ -8,12 +8,13 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Sequence
+from functools import partial
 
 import structlog
 
-from compd.clock import Clock
 from compd.live.memory import Doubt, TrustMemory
 from compd.live.service.message_keys.answers import AcceptKeys
+from compd.live.system import System
 
 # Votes look at 0.3 s of readings at most. Of a gauge that is read less often it is told that it has not been read yet.
 WATCHED_S = 1.0
@@ -27,8 +28,8 @@ _log = structlog.get_logger()
 class Acceptance:
     """Accepts gauges; each order is watched by a thread of its own."""
 
-    def __init__(self, trust: TrustMemory, clock: Clock) -> None:
-        self._trust, self._clock = trust, clock
+    def __init__(self, trust: TrustMemory, system: System) -> None:
+        self._trust, self._system = trust, system
 
     def start(self, gauge: str, answer: Callable[[bytes], None]) -> None:
         """Have the channels of a gauge believed; `answer` gets the ACCEPT line.
@@ -36,21 +37,20 @@ class Acceptance:
         gauge : its name, a "gauge.channel", or "all". Raises ValueError, with a text for the client, for none.
         """
         channels = self._trust.accept(gauge)
-        work = threading.Thread(target=self._watch, args=(gauge, channels, answer), name="acceptance", daemon=True)
-        work.start()
+        self._system.thread(partial(self._watch, gauge, channels, answer), "acceptance").start()
 
     def _watch(self, gauge: str, channels: Sequence[str], answer: Callable[[bytes], None]) -> None:
         never = threading.Event()
-        start_s = self._clock.monotonic()
+        start_s = self._system.monotonic()
         since_s: dict[str, float] = {}
-        while channels and (now_s := self._clock.monotonic()) < start_s + WATCHED_S:
+        while channels and (now_s := self._system.monotonic()) < start_s + WATCHED_S:
             for channel in channels:
                 if self._is_believed(channel):
                     since_s.setdefault(channel, now_s)
                 else:
                     since_s.pop(channel, None)
-            self._clock.wait(never, _LOOK_EVERY_S)
-        now_s = self._clock.monotonic()
+            self._system.wait(never, _LOOK_EVERY_S)
+        now_s = self._system.monotonic()
         not_believed = {channel: self._reason(channel) for channel in channels if channel not in since_s}
         believed_for_s = {channel: round(now_s - begin_s, 3) for channel, begin_s in since_s.items()}
         _log.warning("gauges accepted", gauge=gauge, channels=list(since_s), not_believed=not_believed)

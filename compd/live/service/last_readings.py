@@ -9,21 +9,18 @@ from __future__ import annotations
 
 import json
 import math
-import os
 import threading
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
-from uuid import UUID
 
 import numpy as np
 import structlog
 from pydantic import BaseModel, ConfigDict, FiniteFloat, ValidationError
 
-from compd.clock import Clock
-from compd.files import CHECKSUM, checksum_of, write_files
+from compd.files import CHECKSUM, checksum_of
 from compd.live.memory import Doubt, TrustMemory
-from compd.live.system import changed_ports
+from compd.live.system import System, changed_ports
 
 FILE_NAME = "last-readings.json"
 _FORMAT = 1
@@ -32,9 +29,8 @@ _WRITTEN_SHARE = 0.5
 # Least interval (s) of writing the file, which happens only after a motion or a distrust of a gauge.
 _LOOK_EVERY_S = 1.0
 _END_WITHIN_S = 0.5
-_BOOT_ID = Path("/proc/sys/kernel/random/boot_id")
-# Set by the unit: %b of systemd.unit(5).
-_GIVEN_BOOT_ID = "COMPD_BOOT_ID"
+# Ten times what a machine with a hundred gauges leaves.
+_MAX_BYTES = 1_000_000
 
 _NO_PORTS: Mapping[str, str] = {}
 log = structlog.get_logger()
@@ -76,7 +72,7 @@ class LastReadings:
     """Keeps `TrustMemory` on disk, by a thread of its own."""
 
     def __init__(
-        self, directory: Path, zero_hash: str, memory: TrustMemory, clock: Clock, ports: Mapping[str, str] = _NO_PORTS
+        self, directory: Path, zero_hash: str, memory: TrustMemory, system: System, ports: Mapping[str, str] = _NO_PORTS
     ) -> None:
         """`zero_hash`: of the configuration; readings of another one say nothing. `ports`: the lasting name of each
         gauge's port."""
@@ -84,9 +80,9 @@ class LastReadings:
         self._path = directory / FILE_NAME
         self._zero_hash = zero_hash
         self._memory = memory
-        self._clock = clock
+        self._system = system
         self._stop = threading.Event()
-        self._thread = threading.Thread(target=self._run, name="last readings", daemon=True)
+        self._thread = system.thread(self._run, "last readings")
         self._written: tuple[np.ndarray, np.ndarray] | None = None
         self._failed = False
 
@@ -98,7 +94,7 @@ class LastReadings:
         self._take(file)
 
     def _take(self, file: _LastReadingsFile) -> None:
-        memory, now_s = self._memory, self._clock.monotonic()
+        memory, now_s = self._memory, self._system.monotonic()
         values = {channel: last.value_mm for channel, last in file.readings.items()}
         values |= {channel: last.value for channel, last in file.quantities.items()}
         doubts: dict[str, _LastDoubt] = {**file.readings, **file.quantities}
@@ -109,12 +105,12 @@ class LastReadings:
         for i, last in known.items():
             if last.doubt > Doubt.LOST:
                 memory.distrust(i, Doubt(min(last.doubt, max(Doubt))), math.nan if last.amount is None else last.amount)
-            elif i >= memory.lengths and file.boot_id == boot_id():
+            elif i >= memory.lengths and file.boot_id == self._system.boot_id():
                 memory.believe(
                     i, values[memory.channels[i]], file.time_s
                 )  # since then it changes no faster than it can
             else:
-                memory.lose(i, now_s, power=last.power_lost or file.boot_id != boot_id())
+                memory.lose(i, now_s, power=last.power_lost or file.boot_id != self._system.boot_id())
         memory.tell({memory.channels[i]: last.evidence for i, last in known.items() if last.evidence})
         before = {memory.channels[i].partition(".")[0]: last.port for i, last in known.items() if last.port}
         memory.distrust_ports(changed_ports(before, self._ports))
@@ -122,7 +118,7 @@ class LastReadings:
     def _read(self) -> _LastReadingsFile | None:
         """What is on disk; None where there is nothing, or nothing that can be used."""
         try:
-            content = self._path.read_text(encoding="utf-8")
+            content = self._system.read_file(self._path, _MAX_BYTES).decode()
         except FileNotFoundError:
             return None
         except (OSError, UnicodeDecodeError) as error:
@@ -150,7 +146,7 @@ class LastReadings:
         self._thread.join(_END_WITHIN_S)
 
     def _run(self) -> None:
-        while not self._clock.wait(self._stop, _LOOK_EVERY_S):
+        while not self._system.wait(self._stop, _LOOK_EVERY_S):
             self._write_if_changed()
         self._written = None  # at the end in any case: its time says for how long the daemon was away
         self._write_if_changed()
@@ -176,15 +172,15 @@ class LastReadings:
         content: dict[str, Any] = {
             "format": _FORMAT,
             "zero_hash": self._zero_hash,
-            "boot_id": boot_id(),
-            "time_s": self._clock.monotonic(),
+            "boot_id": self._system.boot_id(),
+            "time_s": self._system.monotonic(),
             "readings": {channel: entry for channel, entry in entries.items() if channel in lengths},
             "quantities": {channel: entry for channel, entry in entries.items() if channel not in lengths},
         }
         content[CHECKSUM] = checksum_of(content)
         try:
             self._path.parent.mkdir(parents=True, exist_ok=True)
-            write_files({self._path: json.dumps(content, indent=1, allow_nan=False) + "\n"})
+            self._system.write_files({self._path: json.dumps(content, indent=1, allow_nan=False) + "\n"})
         except OSError as error:
             if not self._failed:
                 log.warning("last readings cannot be written", path=str(self._path), reason=error.strerror)
@@ -205,12 +201,3 @@ class LastReadings:
             if doubt in (Doubt.VOTED, Doubt.REPLUGGED):
                 entry["evidence"] = evidence
         return entry
-
-
-def boot_id() -> str:
-    """A text that is another one after every start of the computer.
-
-    The unit gives it, since it hides the kernel's own (ProcSubset=pid of systemd.exec(5)).
-    """
-    given = os.environ.get(_GIVEN_BOOT_ID)
-    return str(UUID(given)) if given else _BOOT_ID.read_text(encoding="ascii").strip()

@@ -10,17 +10,18 @@ import math
 import queue
 import threading
 from collections.abc import Callable, Mapping
+from functools import partial
 from typing import Any, NamedTuple
 
 import structlog
 
-from compd.clock import Clock
 from compd.documents import MAX_BYTES
 from compd.files import read_descriptor
 from compd.live.machine import ModelText
 from compd.live.memory import Control
 from compd.live.service.message_keys.answers import ModelKeys
 from compd.live.service.messages import ErrorCode, ProtocolError
+from compd.live.system import System
 
 # A file of 1 MB is read in milliseconds, from a network in a second.
 READ_WITHIN_S = 5.0
@@ -59,7 +60,7 @@ class ModelSwitch:
         self,
         control: Control,
         wake: Callable[[], None],
-        clock: Clock,
+        system: System,
         keeping: Callable[[Mapping[str, Any]], Mapping[str, Any]] = lambda models: {},
     ) -> None:
         """`wake` lets the publisher's thread call `look`; it is called from any thread. `keeping`: the keys of MODEL
@@ -67,7 +68,7 @@ class ModelSwitch:
         self._control = control
         self._keeping = keeping
         self._wake = wake
-        self._clock = clock
+        self._system = system
         self._number = 0
         self._wish = ModelWish()
         self._answer: Callable[[bytes], None] | None = None
@@ -95,10 +96,8 @@ class ModelSwitch:
                 "(SCM_RIGHTS, in the same sendmsg), as `compd model adopt FILE` and compd.client do",
             )
         self._begin(wish, answer)
-        self._read_until_s = self._clock.monotonic() + READ_WITHIN_S
-        reader = threading.Thread(
-            target=self._read_file, args=(self._number, wish.file, sent), name="model file", daemon=True
-        )
+        self._read_until_s = self._system.monotonic() + READ_WITHIN_S
+        reader = self._system.thread(partial(self._read_file, self._number, wish.file, sent), "model file")
         self._readers.append(reader)
         reader.start()
 
@@ -106,7 +105,7 @@ class ModelSwitch:
         """Pass on what has been read, and send the answer, if it has come."""
         while not self._read.empty():
             self._take(self._read.get())
-        if self._answer is not None and self._clock.monotonic() >= self._read_until_s:
+        if self._answer is not None and self._system.monotonic() >= self._read_until_s:
             self._end(f"{self._wish.file} could not be read within {READ_WITHIN_S:g} s: its file system hangs")
         if self._answer is None or (message := self._control.model_answer.read()) is None:
             return

@@ -19,7 +19,6 @@ from typing import Any
 
 import structlog
 
-from compd.clock import Clock
 from compd.live.loop import CycleUnpacker, Setpoint
 from compd.live.memory import RingReader, SharedRing
 from compd.live.service.client_session import ClientSession, Stream
@@ -29,6 +28,7 @@ from compd.live.service.listeners import Listeners
 from compd.live.service.loop_watch import LoopWatch
 from compd.live.service.messages import ErrorCode, ProtocolError
 from compd.live.service.requests import Requests
+from compd.live.system import System
 
 # Between two looks for clients that are to lose their place.
 _LOOK_EVERY_S = 0.25
@@ -53,7 +53,7 @@ class Publisher:
         cycles: SharedRing,
         watch: LoopWatch,
         period_s: float,
-        clock: Clock,
+        system: System,
         observers: Sequence[Callable[[Setpoint], None]] = (),
         packet_hash: bytes | None = None,
     ) -> None:
@@ -64,14 +64,14 @@ class Publisher:
         self._setpoints, self._cycles = RingReader(setpoints), RingReader(cycles)
         self._watch = watch
         self._half_period_s = period_s / 2
-        self._clock = clock
+        self._system = system
         self._observers = tuple(observers)
         self._packet_hash = packet_hash
         self._unpacker = CycleUnpacker()
         self._sessions: set[ClientSession] = set()
         self._answers: deque[tuple[ClientSession, bytes]] = deque()
         self._orders: deque[bytes] = deque()
-        self._unwanted = DescriptorBin()
+        self._unwanted = DescriptorBin(system)
         self._waiting: list[ClientSession] = []  # with lines to answer
         self._next_turn_s = self._next_look_s = -math.inf
         self._selector: selectors.BaseSelector  # from `run` on, in the process that serves
@@ -83,7 +83,7 @@ class Publisher:
     def run(self, requests: Requests, keep_on: Callable[[], bool], each_round: Callable[[], None]) -> None:
         """Serve on this thread, as long as `keep_on`. `each_round` is called at least every `LoopWatch.limit_s`."""
         self._requests = requests
-        self._selector = selectors.DefaultSelector()
+        self._selector = self._system.selector()
         for listener in (self._listeners.tcp, self._listeners.unix):
             if listener is not None:
                 listener.setblocking(False)
@@ -103,7 +103,7 @@ class Publisher:
     def end(self, reason: str) -> None:
         """Send a last setpoint, a `stop` with this reason, and close every connection."""
         self._forward()
-        self._publish_in_place_of_loop(self._watch.stop(self._clock.monotonic(), reason))
+        self._publish_in_place_of_loop(self._watch.stop(self._system.monotonic(), reason))
         for session in self._sessions:
             session.close()
         self._selector.close()
@@ -120,7 +120,7 @@ class Publisher:
         }
 
     def _wait_s(self) -> float:
-        now_s = self._clock.monotonic()
+        now_s = self._system.monotonic()
         wait_s = self._watch.wait_s(now_s)
         return min(wait_s, max(self._next_turn_s - now_s, 0.0)) if self._waiting else wait_s
 
@@ -138,7 +138,7 @@ class Publisher:
             prepare_tcp(connection)
         name = "unix" if local else f"{address[0]}:{address[1]}"
         session = ClientSession(
-            connection, name, local, self._clock.monotonic(), self._unwanted, self._requests.place_of
+            connection, name, local, self._system.monotonic(), self._unwanted, self._requests.place_of
         )
         tcp_clients = sum(not other.local for other in self._sessions)
         if (refusal := seat_refused(local, len(self._sessions), tcp_clients)) is not None:
@@ -153,7 +153,7 @@ class Publisher:
         if events & selectors.EVENT_WRITE:
             session.flush()
         if events & selectors.EVENT_READ and self._is_read(session):
-            session.receive(self._clock.monotonic())
+            session.receive(self._system.monotonic())
             if session.has_ended:
                 self._requests.context.release(session)
             if session.has_lines and session not in self._waiting:
@@ -162,7 +162,7 @@ class Publisher:
 
     def _take_turns(self) -> None:
         """Answer one request of each client that waits: of the controller now, of the others when they are due."""
-        start_s = self._clock.monotonic()
+        start_s = self._system.monotonic()
         controller = self._requests.context.controller
         others = start_s >= self._next_turn_s
         turns = [session for session in self._waiting if others or session is controller]
@@ -170,12 +170,12 @@ class Publisher:
             if not session.open:
                 continue
             self._forward()  # what has been computed until now is not for a client that asks only now
-            session.asked_s = self._clock.monotonic()
+            session.asked_s = self._system.monotonic()
             reply = self._reply(session, session.next_line())
             self._schedule()  # before the answer: a client that has it can rely on the next setpoint
             self._send(session, reply)
         if others and turns:
-            now_s = self._clock.monotonic()
+            now_s = self._system.monotonic()
             self._next_turn_s = now_s + min(_REST_PER_TURN * (now_s - start_s), _MAX_REST_S)
         self._waiting = [
             session for session in self._waiting if session.open and session.is_served and session.has_lines
@@ -193,14 +193,14 @@ class Publisher:
         except ProtocolError as error:
             if not session.authorized and session.is_served:
                 _log.warning("a client has not shown the token", client=session.name, reason=error.code)
-                session.dismissed_s = self._clock.monotonic() + WRONG_TOKEN_REST_S
+                session.dismissed_s = self._system.monotonic() + WRONG_TOKEN_REST_S
             return error.to_json() if session.is_served else b""
         finally:
             session.end_line()
 
     def _look_at_seats(self) -> None:
         """Close the connections of clients that have lost their place."""
-        now_s = self._clock.monotonic()
+        now_s = self._system.monotonic()
         if now_s < self._next_look_s:
             return
         self._next_look_s = now_s + _LOOK_EVERY_S
@@ -246,7 +246,7 @@ class Publisher:
             readings = self._requests.context.messages.readings
             assert readings is not None, "who watches them has been told their columns"
             self._send_to_watchers(Stream.READINGS, cycle.inputs.snapshot.time_s, readings.line(cycle))
-        if (stop := self._watch.missing(self._clock.monotonic())) is not None:
+        if (stop := self._watch.missing(self._system.monotonic())) is not None:
             self._publish_in_place_of_loop(stop)
 
     def _is_setpoint_due(self, time_s: float, state: int) -> bool:
@@ -259,7 +259,7 @@ class Publisher:
         self._last_state = setpoint.state.code
         for observe in self._observers:
             observe(setpoint)
-        if self._clock.monotonic() - setpoint.time_s <= _MAX_AGE_S:
+        if self._system.monotonic() - setpoint.time_s <= _MAX_AGE_S:
             self._send_to_watchers(Stream.SETPOINTS, setpoint.time_s, setpoint.line)
 
     def _publish_in_place_of_loop(self, setpoint: Setpoint) -> None:

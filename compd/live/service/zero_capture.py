@@ -6,13 +6,12 @@ import math
 import threading
 from collections import defaultdict
 from collections.abc import Callable, Mapping
-from datetime import UTC, datetime
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import structlog
 
-from compd.clock import Clock
 from compd.errors import StateError
 from compd.gauge import Quality
 from compd.live.loop import Commands
@@ -20,15 +19,17 @@ from compd.live.machine import MachineWires, MachineZero
 from compd.live.memory import Latest
 from compd.live.service.message_keys.answers import ZeroKeys
 from compd.live.service.messages import ErrorCode, ProtocolError
+from compd.live.system import System
 
 
 class BackgroundJob:
     """Runs one piece of work at a time. It is free again before the answer goes out, so that the client that has the
     answer may ask at once for the next one."""
 
-    def __init__(self, name: str, busy_text: str) -> None:
+    def __init__(self, name: str, busy_text: str, system: System) -> None:
         """`name`: the thread's; `busy_text`: the error's text for a client that asks while work is running."""
         self._name = name
+        self._system = system
         self._busy_text = busy_text
         self._running = False
         self._thread: threading.Thread | None = None
@@ -38,7 +39,7 @@ class BackgroundJob:
         if self._running:
             raise ProtocolError(ErrorCode.BUSY, self._busy_text)
         self._running = True
-        self._thread = threading.Thread(target=self._run, args=(work, answer), name=self._name, daemon=True)
+        self._thread = self._system.thread(partial(self._run, work, answer), self._name)
         self._thread.start()
 
     def join(self, timeout_s: float | None = None) -> bool:
@@ -87,7 +88,7 @@ class ZeroCapture:
         commands: Commands,
         directory: Path,
         zero_hash: str,
-        clock: Clock,
+        system: System,
         accept: Callable[[str], object] = lambda gauge: None,
         ports: Mapping[str, str] = _NO_PORTS,
     ) -> None:
@@ -100,9 +101,9 @@ class ZeroCapture:
         self._commands = commands
         self._directory = directory
         self._zero_hash = zero_hash
-        self._clock = clock
+        self._system = system
         self._stop = threading.Event()
-        self._job = BackgroundJob("zero", "machine zero is being taken already")
+        self._job = BackgroundJob("zero", "machine zero is being taken already", system)
 
     def start(self, replace: bool, answer: Callable[[bytes], None]) -> None:
         """Begin; `answer` gets the ZERO or ERROR line at the end. Raises ProtocolError while one is being taken.
@@ -121,7 +122,7 @@ class ZeroCapture:
     def _capture(self, replace: bool) -> bytes:
         try:
             zero, changed_mm = self._measure(replace)
-            path = zero.save(self._directory)
+            path = zero.save(self._directory, self._system)
         except ProtocolError as error:
             _log.warning("machine zero differs", reason=error.text)
             return error.to_json()
@@ -169,7 +170,7 @@ class ZeroCapture:
             )
             self._accept_lengths()
             self._wait_until_believed()
-        taken_at = datetime.now(UTC).isoformat(timespec="seconds")
+        taken_at = self._system.utc().isoformat(timespec="seconds")
         zero = MachineZero(self._zero_hash, taken_at, *self.sample(), self._ports)
         if not isinstance(before, MachineZero):
             return zero, {}
@@ -188,7 +189,7 @@ class ZeroCapture:
 
     def _distrusted(self) -> list[str]:
         """Each length gauge that is not believed, with the reason."""
-        readings = self._latest.snapshot(self._clock.monotonic()).readings
+        readings = self._latest.snapshot(self._system.monotonic()).readings
         of_wires = [(wire.channel, readings[wire.slot]) for wire in self._wires.length_wires]
         return [
             f"{channel} ({reading.detail or 'no reason given'})"
@@ -198,9 +199,9 @@ class ZeroCapture:
 
     def _wait_until_believed(self) -> None:
         """Until no length gauge is distrusted, or too long; what is not believed then is refused as not read."""
-        end_s = self._clock.monotonic() + _BELIEVED_WITHIN_S
-        while self._distrusted() and self._clock.monotonic() < end_s:
-            if self._clock.wait(self._stop, _LOOK_EVERY_S):
+        end_s = self._system.monotonic() + _BELIEVED_WITHIN_S
+        while self._distrusted() and self._system.monotonic() < end_s:
+            if self._system.wait(self._stop, _LOOK_EVERY_S):
                 return
 
     def sample(self) -> tuple[dict[str, float], dict[str, float]]:
@@ -215,9 +216,9 @@ class ZeroCapture:
         quantities: dict[str, dict[float, float]] = defaultdict(dict)
         names = self._wires.quantity_names
         wires, not_good = self._wires.quantity_wires(names), set[str]()
-        start_s = self._clock.monotonic()
+        start_s = self._system.monotonic()
         while True:
-            snapshot = self._latest.snapshot(self._clock.monotonic())
+            snapshot = self._latest.snapshot(self._system.monotonic())
             if lost := self._wires.lost(snapshot):
                 raise StateError.of(
                     "machine zero",
@@ -235,7 +236,7 @@ class ZeroCapture:
                     not_good.add(name)
             if snapshot.time_s - start_s >= _WINDOW_S:
                 break
-            if self._clock.wait(self._stop, _LOOK_EVERY_S):
+            if self._system.wait(self._stop, _LOOK_EVERY_S):
                 raise StateError.of("machine zero", "the daemon is stopping", next_step="take zero again")
         for channel, readings in values_mm.items():
             spread_mm = max(readings.values()) - min(readings.values())

@@ -1,9 +1,11 @@
-from .child_process import OUT_OF_MEMORY as OUT_OF_MEMORY
 from .child_process import ChildProcess as ChildProcess
-from .child_process import end_with_parent as end_with_parent
 from .events import name_event as name_event
+from .forked_process import OUT_OF_MEMORY as OUT_OF_MEMORY
+from .forked_process import ForkedProcess as ForkedProcess
+from .forked_process import end_with_parent as end_with_parent
 from .journal import Journal as Journal
 from .memory_limit import limit_memory as limit_memory
+from .privileges import Privileges as Privileges
 from .process_limits import exhaustion_named as exhaustion_named
 from .process_limits import require_descriptors as require_descriptors
 from .process_limits import require_limits as require_limits
@@ -18,4 +20,7 @@ from .realtime import sleep_until as sleep_until
 from .realtime import use_fifo as use_fifo
 from .serial_names import changed_ports as changed_ports
 from .serial_names import port_names as port_names
+from .system import SIGNALS as SIGNALS
+from .system import THIS_COMPUTER as THIS_COMPUTER
+from .system import System as System
 from .systemd import Notifier as Notifier

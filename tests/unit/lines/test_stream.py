@@ -18,7 +18,7 @@ import pytest
 
 from compd.clock import MonotonicClock
 from compd.gauge import LineFault, Quality
-from compd.lines import open_line, open_stream
+from compd.lines import WrappedPorts, open_line, open_stream
 from compd.lines.kinds.modbus_rtu.master import RtuMaster
 from compd.lines.port import Port, SerialPort, TcpPort
 from compd.lines.stream import MAX_DRAIN_TIMEOUTS, MIN_REST, StreamLine
@@ -232,7 +232,7 @@ def test_a_line_over_a_wrapped_port_is_otherwise_the_same(pty: tuple[int, str], 
     plain.close()
     stream = plain._stream if isinstance(plain, RtuMaster) else plain
     assert isinstance(stream, StreamLine)
-    shown = open_stream(settings, MonotonicClock(), wrap)
+    shown = open_stream(settings, MonotonicClock(), WrappedPorts(wrap))
     assert shown._gap_s == stream._gap_s, "the silence before a request"
     shown.send(b"?\r")
     assert os.read(master, 10) == b"?\r" == ports[0].written

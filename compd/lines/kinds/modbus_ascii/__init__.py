@@ -10,7 +10,7 @@ from compd.lines.serial_definition import SerialDefinition
 
 if TYPE_CHECKING:
     from compd.lines.kinds.modbus_ascii.master import AsciiMaster
-    from compd.lines.line import WrapPort
+    from compd.lines.ports import Ports
     from compd.twins import PolledTwin
 
 
@@ -22,10 +22,10 @@ class ModbusAscii(SerialDefinition):
     settings = ModbusAsciiLine
     order = 40
 
-    def open(self, settings: ModbusAsciiLine, clock: Clock, wrap_port: WrapPort) -> AsciiMaster:
+    def open(self, settings: ModbusAsciiLine, clock: Clock, ports: Ports) -> AsciiMaster:
         from compd.lines.kinds.modbus_ascii.master import AsciiMaster
 
-        return AsciiMaster(self.stream(settings, clock, wrap_port), settings.ask_one_more)
+        return AsciiMaster(self.stream(settings, clock, ports), settings.ask_one_more)
 
     def bytes_on_wire(self, sent: int, received: int) -> tuple[int, int]:
         """Two digits for each byte, one byte of LRC for two of CRC, and : CR LF."""

@@ -11,7 +11,7 @@ from compd.lines.serial_definition import SerialDefinition
 
 if TYPE_CHECKING:
     from compd.lines.kinds.modbus_rtu.master import RtuMaster
-    from compd.lines.line import WrapPort
+    from compd.lines.ports import Ports
     from compd.twins import PolledTwin
 
 
@@ -25,10 +25,10 @@ class ModbusRtu(SerialDefinition):
     rtu = True
     tries_drivers = True
 
-    def open(self, settings: ModbusRtuLine, clock: Clock, wrap_port: WrapPort) -> RtuMaster:
+    def open(self, settings: ModbusRtuLine, clock: Clock, ports: Ports) -> RtuMaster:
         from compd.lines.kinds.modbus_rtu.master import RtuMaster
 
-        return RtuMaster(self.stream(settings, clock, wrap_port), settings.ask_one_more, settings.skip_bytes)
+        return RtuMaster(self.stream(settings, clock, ports), settings.ask_one_more, settings.skip_bytes)
 
     def min_gap_s(self, settings: SerialPortSettings) -> float:
         from compd.lines.kinds.modbus_rtu.master import gap_s

@@ -10,7 +10,7 @@ from compd.lines.tcp_definition import TcpDefinition
 
 if TYPE_CHECKING:
     from compd.lines.kinds.modbus_tcp.master import ModbusTcp
-    from compd.lines.line import WrapPort
+    from compd.lines.ports import Ports
     from compd.twins import PolledTwin
 
 
@@ -25,12 +25,12 @@ class ModbusTcpDefinition(TcpDefinition):
     broadcast_answered = True
     tries_drivers = True
 
-    def open(self, settings: ModbusTcpLine, clock: Clock, wrap_port: WrapPort) -> ModbusTcp:
-        """The line; its port is within its library, and stays as it is."""
+    def open(self, settings: ModbusTcpLine, clock: Clock, ports: Ports) -> ModbusTcp:
+        """The line; nothing is put around its port."""
         from compd.lines.kinds.modbus_tcp.master import ModbusTcp
 
         return ModbusTcp(
-            settings.host, settings.port, settings.timeout_s, clock, settings.pause_s, settings.gateway_wait_s
+            settings.host, settings.port, settings.timeout_s, clock, settings.pause_s, settings.gateway_wait_s, ports
         )
 
     def absent_wait_s(self, settings: ModbusTcpLine) -> float:

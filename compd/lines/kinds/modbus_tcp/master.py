@@ -30,7 +30,8 @@ from pymodbus.pdu.register_message import (
 from compd.clock import Clock
 from compd.gauge import LineFault, Quality, RegisterReply
 from compd.lines.modbus_serial import WRITE_COIL, WRITE_REGISTER, WRITE_REGISTERS, exception_fault
-from compd.lines.port import TcpPort
+from compd.lines.port import NetworkPort
+from compd.lines.ports import PORTS, Ports
 from compd.lines.usual_time import UsualWait
 
 # Every fault becomes a LineFault and reaches STATUS; pymodbus would log each one, and each late reply, as well.
@@ -58,6 +59,7 @@ class ModbusTcp:
         clock: Clock,
         pause_s: float = 0.0,
         gateway_wait_s: float | None = None,
+        ports: Ports = PORTS,
     ) -> None:
         """Connect within `timeout_s`. `pause_s`: from a reply to the next request, s.
 
@@ -67,6 +69,7 @@ class ModbusTcp:
         Raises LineFault (LINE_LOST) when the device cannot be reached.
         """
         self._address = (host, port)
+        self._ports = ports
         self._timeout_s = timeout_s
         self._reply = UsualWait(timeout_s)
         self._gateway_wait_s = timeout_s if gateway_wait_s is None else gateway_wait_s
@@ -80,7 +83,7 @@ class ModbusTcp:
         self._unanswered = 0  # requests since the last reply
         self._busy_until_s = -math.inf  # until then the gateway may wait for a unit that was asked before
         self._last_bytes_s = -math.inf
-        self._port: TcpPort | None = self._connect()
+        self._port: NetworkPort | None = self._connect()
 
     @property
     def peer(self) -> str:
@@ -143,9 +146,9 @@ class ModbusTcp:
         if rest_s > 0:
             self._clock.wait(self._no_event, rest_s)
 
-    def _connect(self) -> TcpPort:
+    def _connect(self) -> NetworkPort:
         """A new connection, in which nothing of an old reply can be left. Raises LineFault (LINE_LOST)."""
-        port = TcpPort(*self._address, self._timeout_s)
+        port = self._ports.tcp(*self._address, self._timeout_s)
         self._received.clear()
         self._unanswered = 0
         self._busy_until_s = -math.inf
@@ -179,7 +182,7 @@ class ModbusTcp:
             raise self._closed(Quality.MISMATCH, f"asked function {request.function_code}, got {reply.function_code}")
         return time_s, reply
 
-    def _receive(self, port: TcpPort, request: ModbusPDU, time_s: float) -> ModbusPDU:
+    def _receive(self, port: NetworkPort, request: ModbusPDU, time_s: float) -> ModbusPDU:
         """The reply to the request that was made at `time_s` (s). Raises LineFault, and what pymodbus raises.
 
         A late reply to an earlier request shows that the gateway has come to the next: the timeout begins anew.

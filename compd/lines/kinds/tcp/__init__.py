@@ -9,7 +9,7 @@ from compd.lines.kinds.tcp.settings import TcpLine
 from compd.lines.tcp_definition import TcpDefinition
 
 if TYPE_CHECKING:
-    from compd.lines.line import WrapPort
+    from compd.lines.ports import Ports
     from compd.lines.stream import StreamLine
     from compd.twins import PolledTwin
 
@@ -27,11 +27,10 @@ class Tcp(TcpDefinition):
     order = 20
     tries_drivers = True
 
-    def stream(self, settings: TcpLine, clock: Clock, wrap_port: WrapPort) -> StreamLine:
-        from compd.lines.port import TcpPort
+    def stream(self, settings: TcpLine, clock: Clock, ports: Ports) -> StreamLine:
         from compd.lines.stream import StreamLine
 
-        port = wrap_port(TcpPort(settings.host, settings.port, settings.timeout_s))
+        port = ports.of_stream(ports.tcp(settings.host, settings.port, settings.timeout_s))
         return StreamLine(port, settings.timeout_s, max(GAP_S, settings.pause_s), clock, settings.echo)
 
     @property
