@@ -4,16 +4,14 @@ from __future__ import annotations
 
 import heapq
 import itertools
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from typing import Any
-from unittest.mock import patch
 
 from greenlet import getcurrent
 
 from compd.gauge import LineFault, Quality
 from compd.line_settings import PolledLineSettings
-from compd.lines import polled_definition
+from compd.lines import Ports, polled_definition
 from tests.worlds.hub import Actor, Hub
 
 # From the last bit of a request to the moment at which a device samples, and from there to its reply, s: the range.
@@ -161,19 +159,14 @@ class WirePort:
             raise LineFault(Quality.LINE_LOST, "read: the port has hung up")
 
 
-@contextmanager
-def opened_virtually(wires: Callable[[], Mapping[str, Wire]]) -> Iterator[None]:
-    """Within the block every serial port and TCP connection of a line is that of a wire, by its address."""
+class VirtualPorts(Ports):
+    """Every serial port and TCP connection of a line is that of a wire, by its address."""
 
-    def serial(port: str, *_: Any, **__: Any) -> WirePort:
-        return wires()[port].open()
+    def __init__(self) -> None:
+        self.wires: dict[str, Wire] = {}
 
-    def tcp(host: str, port: int, *_: Any, **__: Any) -> WirePort:
-        return wires()[f"{host}:{port}"].open()
+    def serial(self, port: str, *_: Any) -> WirePort:
+        return self.wires[port].open()
 
-    with (
-        patch("compd.lines.port.SerialPort", serial),
-        patch("compd.lines.port.TcpPort", tcp),
-        patch("compd.lines.kinds.modbus_tcp.master.TcpPort", tcp),
-    ):
-        yield
+    def tcp(self, host: str, port: int, timeout_s: float) -> WirePort:
+        return self.wires[f"{host}:{port}"].open()

@@ -1,21 +1,25 @@
-"""A machine, its devices and the daemon's own parts in one process and in virtual time.
+"""A machine, its devices and the whole daemon in one process and in virtual time.
 
-The truth, the devices and their wires are simulated; acquisition, drivers, trust, votes, loop and last readings are the
-product's, unchanged. They run as greenlets on the clock of a hub, so that a seed gives the same setpoints each time.
+The truth, the devices and their wires are simulated; supervisor, acquisition, drivers, trust, votes, loop, service and
+state on disk are the product's, unchanged, on a `VirtualSystem`. A seed gives the same setpoints each time.
 """
 
 from __future__ import annotations
 
+import json
 import math
 import random
 import shutil
+import signal
 import tempfile
-from collections.abc import Callable, Iterator, Sequence
+from collections import deque
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from copy import deepcopy
 from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
+from unittest.mock import patch
 
 import numpy as np
 import structlog
@@ -23,26 +27,35 @@ import yaml
 
 from compd.configuration import Configuration, load
 from compd.documents import read_document
-from compd.line_settings import powered
-from compd.live.acquisition import LOOK_EVERY_S, Acquisition, Votes
-from compd.live.loop import Commands, Loop, LoopTiming, Setpoint, build_pipeline
+from compd.live.daemon import Daemon
+from compd.live.loop import Setpoint
 from compd.live.machine import MachineZero
-from compd.live.service import LastReadings
-from compd.live.wired_trust import wired_channels, wired_memory, wired_trust
+from compd.live.run_daemon import run_daemon
 from compd.plugins import SIMULATED_GAUGES
 from compd.plugins import load as load_plugin
 from compd.setpoint_states import State
 from compd.simulation import World as Truth
 from compd.simulation.truth.motion import DRIVES, Drives
 from compd.simulation.wires.server import STEP_S, LiveWorld, Sensing
+from tests.worlds.clients import Clients
 from tests.worlds.hub import Hub
-from tests.worlds.wires import Wire, opened_virtually
+from tests.worlds.virtual_system import VirtualSystem
+from tests.worlds.wires import VirtualPorts, Wire
 
 # Processes of the daemon.
-ACQUISITION, LOOP, SERVICE = "acquisition", "loop", "service"
-_TAKEN_AT = "2026-01-01T00:00:00+00:00"
+SUPERVISOR, ACQUISITION, LOOP, SERVICE = "supervisor", "acquisition", "loop", "service"
+# A loop with other models, before and after it has the turn.
+NEXT_LOOP = "next loop"
+# `RestartSec` of systemd/compd.service, s.
+RESTART_S = 0.1
+# Of a computer that boots, s: until the daemon starts.
+BOOT_S = 5.0
 # Until every gauge has been read often enough after a start.
-STARTS_WITHIN_S = 2.0
+STARTS_WITHIN_S = 4.0
+ZERO_WITHIN_S = 6.0
+# Setpoints per second of the program that watches.
+WATCHED_HZ = 20.0
+_LOG_ENTRIES = 1000
 
 
 class Told(NamedTuple):
@@ -63,28 +76,36 @@ class World:
     Attributes
     ----------
     wires : by name of the line. shown : by gauge, changes what its device senses: (channel, true value) -> value.
-    told : every setpoint since the last `forget`.
+    told : every setpoint since the last `forget`. observers : called with each one, and its line as it is sent.
+    clients : of the daemon. log : the last entries of its log. died : tracebacks in the daemon.
     """
 
-    def __init__(self, hub: Hub, configuration: Configuration, truth: Truth, directory: Path, wires: dict[str, Wire]):
+    def __init__(self, hub: Hub, configuration: Configuration, truth: Truth, directory: Path) -> None:
         self.hub = hub
         self.configuration = configuration
         self.truth = truth
-        self.wires = wires
         self.shown: dict[str, Callable[[str, float], float]] = {}
         self.told: list[Told] = []
-        self._live = LiveWorld(truth, hub)
-        self._directory = directory
+        self.observers: list[Callable[[Told, bytes], None]] = []
+        self.log: deque[Mapping[str, Any]] = deque(maxlen=_LOG_ENTRIES)
+        self.directory = directory
+        self.ports = VirtualPorts()
+        self.system = VirtualSystem(hub, self.ports)
+        self.wires: dict[str, Wire] = {}
+        self.clients = Clients(self.system, Path(configuration.sockets.unix.path))
+        self.daemon: Daemon | None = None
+        self._on = False
+        self._closing: list[Daemon] = []
+        self._live = LiveWorld(truth, self.system)
         self._plug_in_devices()
         hub.every(STEP_S, self._live.step)
-        self.start()
 
     def _plug_in_devices(self) -> None:
         configuration = self.configuration
         sensing = Sensing(configuration, self._live)
         for name, settings in configuration.lines.items():
             gauges = [gauge for gauge, options in configuration.gauges.items() if options.line == name]
-            self.wires[settings.address] = self.wires[name] = Wire(
+            self.ports.wires[settings.address] = self.wires[name] = Wire(
                 self.hub,
                 settings,
                 [
@@ -102,107 +123,119 @@ class World:
 
     # --- the daemon ------------------------------------------------------------------------------------
 
-    def start(self, zero: MachineZero | None = None) -> None:
-        """Start the daemon; `zero` is on its disk."""
-        configuration = self.configuration
-        self._pipeline = pipeline = build_pipeline(configuration, configuration.gauge_objects())
-        self.trust = wired_memory(configuration, pipeline.wires)
-        zero = zero or MachineZero(
-            configuration.zero_hash, _TAKEN_AT, dict.fromkeys(pipeline.wires.length_channels, 0.0)
-        )
-        self.commands = Commands(zero)
-        self.commands.models = pipeline.settings.without_effects
-        last = LastReadings(self._directory, configuration.zero_hash, self.trust, self.hub)
-        last.recall()
-        self._timing = LoopTiming(pipeline.settings.period_s)
-        self._newest: Setpoint | None = None
-        self._service = [self.hub.spawn(last._run, SERVICE)]
-        self.start_acquisition()
-        self.start_loop()
+    def start(self) -> None:
+        """Start the daemon, as the service manager does; it starts it anew when it has failed."""
+        self._on = True
+        self.system.start(self._run_daemon, SUPERVISOR)
 
-    def start_acquisition(self) -> None:
-        """Start the process that polls the gauges."""
-        configuration, pipeline = self.configuration, self._pipeline
-        trust = wired_trust(configuration, pipeline.wires, self.trust)
-        gauges = configuration.gauge_objects()
-        on_line = {
-            line: [(name, gauges[name]) for name in gauges if configuration.gauges[name].line == line]
-            for line in configuration.lines
-        }
-        stale_after_s = {
-            name: configuration.loop.stale_after_s if options.stale_after_s is None else options.stale_after_s
-            for name, options in configuration.gauges.items()
-        }
-        lines = {
-            line: (powered(configuration.lines[line], [gauge for _, gauge in named]), named)
-            for line, named in on_line.items()
-        }
-        self.acquisition = Acquisition(lines, stale_after_s, pipeline.latest, self.hub, trust=trust)
-        votes = Votes(
-            configuration.votes,
-            self.trust,
-            wired_channels(configuration, pipeline.wires, pipeline.settings.model),
-            pipeline.wires.quantity_channels,
-            pipeline.latest,
-            lambda: self.zero.readings_mm,
-            lambda: None if self._newest is None else self._newest.to_json(),
-            configuration.geometry.scale_signal_period_mm or math.nan,
-        )
+    def _run_daemon(self) -> None:
+        failed = run_daemon(load(self.configuration.path), self.system)
+        self._closing.clear()
+        if failed and self._on:
+            self.hub.at(self.hub.now_s + RESTART_S, self.start)
 
-        def look() -> None:
-            while True:
-                votes.look(self.hub.now_s)
-                self.hub.sleep_until(self.hub.now_s + LOOK_EVERY_S)
+    def observe(self, daemon: Daemon) -> None:
+        """A daemon has been made: this one, or the one of another configuration."""
+        put = daemon.setpoints.put
 
-        threads = [line._run for line in self.acquisition.lines.values()]
-        self._polling = [self.hub.spawn(run, ACQUISITION) for run in (*threads, look)]
+        def seen(time_s: float, state: int, content: bytes) -> None:
+            put(time_s, state, content)
+            self._note(Setpoint.unpack(content).line)
 
-    def start_loop(self) -> None:
-        """Start the process of the loop."""
-        loop = Loop(
-            self._pipeline.settings,
-            self._pipeline.latest,
-            self.commands,
-            [self._note],
-            self.hub,
-            self._timing,
-            sleep_until=self.hub.sleep_until,
-        )
-        loop.collector.collect_if_due = lambda _: None  # type: ignore[method-assign]  the collector of this process rests
-        self._looping = [self.hub.spawn(lambda: loop.run(lambda: True), LOOP)]
+        daemon.setpoints.put = seen  # type: ignore[method-assign]
+        self.daemon = daemon
+        self._closing.append(daemon)
+
+    def kill(self, process: str) -> None:
+        """SIGKILL for a process of the daemon."""
+        for name in self._named(process):
+            self.system.processes[name].kill()
 
     def kill_acquisition(self) -> None:
         """End the process that polls the gauges."""
-        self.hub.kill(self._polling)
+        self.kill(ACQUISITION)
+
+    def pause(self, duration_s: float, process: str = "") -> None:
+        """Let no process of the daemon run for so long, s; or one of them."""
+        for name in self._named(process) if process else self._running():
+            self.hub.pause(name, self.hub.now_s + duration_s)
+
+    def _named(self, process: str) -> list[str]:
+        names = [LOOP, NEXT_LOOP] if process == LOOP else [process]
+        return [name for name in names if name in self._running()]
+
+    def _running(self) -> list[str]:
+        return [
+            name for name, process in self.system.processes.items() if process.running and not name.startswith("client")
+        ]
+
+    def restart(self) -> None:
+        """A person restarts the unit."""
+        self._on = False
+        self.system.send_signal(signal.SIGTERM)
+        self.hub.at(self.hub.now_s + 2.0, self.start)
+
+    def reload(self, change: Callable[[dict[str, Any]], None] = lambda document: None) -> None:
+        """A person changes the configuration and reloads it."""
+        path = self.configuration.path
+        document = yaml.safe_load(path.read_text())
+        change(document)
+        path.write_text(yaml.safe_dump(document, sort_keys=False))
+        self.system.send_signal(signal.SIGHUP)
+
+    def reboot(self, off_s: float = BOOT_S) -> None:
+        """The computer has no power for so long, s."""
+        self.stop()
+        self.system.boot()
+        self.hub.at(self.hub.now_s + off_s, self.start)
+
+    def set_clock(self, by_s: float) -> None:
+        """Somebody sets the calendar's clock."""
+        self.system.calendar_s += by_s
 
     def stop(self) -> None:
         """End the daemon at once."""
-        self.hub.kill([*self._polling, *self._looping, *self._service])
+        self._on = False
+        names = self._running()
+        for name in sorted(names, key=lambda name: name == SUPERVISOR):
+            self.system.processes[name].kill()
+        daemons, self._closing = self._closing, []
+        for daemon in daemons:
+            daemon.close()
 
-    def pause(self, duration_s: float) -> None:
-        """Let no process of the daemon run for so long, s."""
-        for group in (ACQUISITION, LOOP, SERVICE):
-            self.hub.pause(group, self.hub.now_s + duration_s)
+    @property
+    def died(self) -> list[str]:
+        """Tracebacks of the daemon's processes and in its log."""
+        return [*self.system.tracebacks, *(entry["exception"] for entry in self.log if entry.get("exception"))]
 
     @property
     def zero(self) -> MachineZero:
         """The machine zero that is used."""
-        zero = self.commands.zero
-        assert isinstance(zero, MachineZero)
+        assert self.daemon is not None
+        zero = self.daemon.commands.zero
+        assert isinstance(zero, MachineZero), zero
         return zero
 
-    # --- persons ---------------------------------------------------------------------------------------
+    # --- persons: each asks, and the answer comes later ------------------------------------------------
 
     def take_zero(self) -> None:
-        """A person takes machine zero here, and accepts every gauge."""
-        memory = self.trust
-        readings_mm = {channel: float(memory.shown[i]) for channel, i in memory.index.items() if i < memory.lengths}
-        self.commands.zero = MachineZero(self.configuration.zero_hash, _TAKEN_AT, readings_mm)
-        self.accept()
+        """A person takes machine zero here."""
+        self.clients.ask({"class": "ZERO", "replace": True})
 
-    def accept(self, name: str = "all") -> None:
+    def accept(self, gauge: str = "all") -> None:
         """A person has looked at a gauge."""
-        self.trust.accept(name)
+        self.clients.ask({"class": "ACCEPT", "gauge": gauge})
+
+    def adopt(self, model: Path | None) -> None:
+        """A person adopts a model file, or none."""
+        if model is None:
+            self.clients.ask({"class": "MODEL", "file": ""})
+        else:
+            self.clients.ask({"class": "MODEL", "file": str(model)}, model)
+
+    def release(self) -> None:
+        """A person takes the controller's role away."""
+        self.clients.ask({"class": "RELEASE"})
 
     # --- the machine -----------------------------------------------------------------------------------
 
@@ -230,9 +263,8 @@ class World:
     # --- time and setpoints ----------------------------------------------------------------------------
 
     def run(self, duration_s: float) -> None:
-        """Let time pass, s. Raises AssertionError where a part of the daemon has died."""
+        """Let time pass, s."""
         self.hub.run(duration_s)
-        assert not self.hub.died, self.hub.died[0]
 
     def forget(self) -> float:
         """Forget the setpoints so far; the time, s."""
@@ -248,24 +280,28 @@ class World:
                 return True
         return False
 
-    def _note(self, setpoint: Setpoint) -> None:
-        self._newest = setpoint
+    def _note(self, line: bytes) -> None:
+        setpoint = json.loads(line)
         error_um = math.nan
         with self._live.now() as truth:
-            if setpoint.values is not None:
+            frame = f"tip_{truth.tip_frame}_mm"
+            if setpoint["valid"]:
                 true_mm = truth.look().tip_M if truth.tip_frame == "M" else truth.look().tip_P
-                error_um = 1e3 * float(np.linalg.norm(np.subtract(_tip_mm(setpoint, truth.tip_frame), true_mm)))
+                error_um = 1e3 * math.dist(setpoint[frame], true_mm)
             moving = truth.phase == "moving"
-        u_tip_um = math.nan if setpoint.u_tip_um is None else setpoint.u_tip_um
-        self.told.append(
-            Told(setpoint.time_s, setpoint.valid, setpoint.state, setpoint.reason, u_tip_um, error_um, moving)
+        u_tip_um = setpoint.get("u_tip_um", math.nan)
+        told = Told(
+            setpoint["time_s"],
+            setpoint["valid"],
+            State(setpoint["state"]),
+            setpoint.get("reason", ""),
+            math.hypot(*u_tip_um) if isinstance(u_tip_um, list) else u_tip_um,
+            error_um,
+            moving,
         )
-
-
-def _tip_mm(setpoint: Setpoint, frame: str) -> np.ndarray:
-    values = setpoint.values
-    assert values is not None
-    return np.asarray(values.tip_M_mm if frame == "M" else values.tip_P_mm)
+        self.told.append(told)
+        for observe in self.observers:
+            observe(told, line)
 
 
 @contextmanager
@@ -282,26 +318,49 @@ def built(
         stack.callback(shutil.rmtree, directory, ignore_errors=True)
         document = deepcopy(read_document(path).data)
         change(document)
-        document["state"] = {"directory": str(directory)}
+        document["state"] = {"directory": str(directory / "state")}
+        sockets = document.setdefault("sockets", {})
+        sockets["unix"] = {"path": str(directory / "socket")}
+        for other in ("tcp", "udp"):
+            sockets.pop(other, None)
         (directory / path.name).write_text(yaml.safe_dump(document, sort_keys=False))
         configuration = load(directory / path.name)
-        wires: dict[str, Wire] = {}
-        stack.enter_context(opened_virtually(lambda: wires))
-        stack.enter_context(_quietly())
         truth = Truth(configuration.geometry, configuration.wiring, seed, zero_hold_s=1e9, drives=drives)
-        world = World(Hub(seed), configuration, truth, directory, wires)
+        hub = Hub(seed)
+        world = World(hub, configuration, truth, directory)
+        stack.enter_context(_logged(world))
+
+        class ObservedDaemon(Daemon):
+            """Tells the world of itself."""
+
+            def __init__(self, *arguments: Any, **named: Any) -> None:
+                super().__init__(*arguments, **named)
+                world.observe(self)
+
+        stack.enter_context(patch("compd.live.run_daemon.Daemon", ObservedDaemon))
+        stack.callback(hub.close)
         stack.callback(world.stop)
+        world.start()
         world.run(STARTS_WITHIN_S)
         world.take_zero()
-        assert world.until_ok(), world.told[-1]
+        assert world.until_ok(ZERO_WITHIN_S), (world.told[-1:], world.clients.answers, world.died)
+        world.clients.watch(WATCHED_HZ)
         yield world
 
 
 @contextmanager
-def _quietly() -> Iterator[None]:
-    """Nobody reads the log."""
+def _logged(world: World) -> Iterator[None]:
+    """The daemon's log goes to its world."""
+
+    def note(_logger: Any, _method: str, entry: Any) -> Any:
+        world.log.append({**entry, "time_s": world.hub.now_s})
+        raise structlog.DropEvent
+
     before = structlog.get_config()
-    structlog.configure(processors=[lambda *_: ""], logger_factory=structlog.ReturnLoggerFactory())
+    structlog.configure(
+        processors=[structlog.processors.add_log_level, structlog.processors.format_exc_info, note],
+        cache_logger_on_first_use=False,
+    )
     try:
         yield
     finally:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from copy import copy
 from dataclasses import dataclass
 
 from compd.errors import StateError
@@ -42,11 +43,17 @@ class Commands:
     """
 
     def __init__(self, zero: MachineZero | StateError, models: Models | None = None) -> None:
-        #: those of this process; None is the machine without effects. Other ones come with another loop process.
+        #: those of a loop; None is the machine without effects. Other ones come with another loop process.
         self.models = models
         self._zero = SharedMessage()
         self._target = SharedMessage(_TARGET_BYTES)
         self.zero = zero
+
+    def with_models(self, models: Models) -> Commands:
+        """The same zero and target, for a loop with these models."""
+        commands = copy(self)
+        commands.models = models
+        return commands
 
     @property
     def zero(self) -> MachineZero | StateError:

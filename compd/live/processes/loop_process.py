@@ -92,10 +92,10 @@ class LoopProcess:
     def run(self, number: int, forget: bool = False) -> None:
         """Cycle as loop `number`, which has the turn. forget : begin anew but for the correction that is applied."""
         models = self.adopted.load(self.loader)
-        self.commands.models = models
-        loop = self._loop()
+        commands = self.commands.with_models(models)
+        loop = self._loop(commands)
         self._prepare(loop)
-        self._try_cycles(self._state_left(models, forget))
+        self._try_cycles(self._state_left(models, forget), commands)
         self.system.privileges.use_fifo(self.settings.loop.priority)
         loop.run(lambda: self.control.keeps_turn(number), self.control.ending, self._state_left(models, forget))
 
@@ -107,10 +107,10 @@ class LoopProcess:
             models = self._models_wanted(before, request)
             wanted = models.shadow if request.shadow else models.applied
             self._require_zero(wanted)
-            self.commands.models = models
-            loop = self._loop()
+            commands = self.commands.with_models(models)
+            loop = self._loop(commands)
             self._prepare(loop)
-            self._try_cycles(self._state_left(before, forget=False))
+            self._try_cycles(self._state_left(before, forget=False), commands)
         except (Exception, SystemExit) as error:  # noqa: BLE001  an effect of a user's own may do anything
             reason = str(error) if isinstance(error, CompdError | ValueError) else f"{type(error).__name__}: {error}"
             _log.warning("model refused", file=request.name, reason=reason)
@@ -150,7 +150,7 @@ class LoopProcess:
         if model is not None and isinstance(zero, MachineZero) and (missing := model.missing_at_zero(zero)):
             raise StateError.of(model.file, missing)
 
-    def _loop(self) -> Loop:
+    def _loop(self, commands: Commands) -> Loop:
         packer = CyclePacker(Directions(self.settings.wires.scale.wires))
 
         def send(setpoint: Setpoint) -> None:
@@ -159,7 +159,7 @@ class LoopProcess:
             self.setpoints.put(time_s, state, content)
             self.cycles.put(time_s, state, packer.pack(setpoint, line))
 
-        return Loop(self.settings, self.latest, self.commands, [send], self.system, self.timing)
+        return Loop(self.settings, self.latest, commands, [send], self.system, self.timing)
 
     def _prepare(self, loop: Loop) -> None:
         """Ask the system for what real time needs. What it does not permit is told, and the loop runs without it."""
@@ -175,19 +175,19 @@ class LoopProcess:
         privileges.use_fifo(_TRIAL_PRIORITY)
         self.control.realtime.write({name: permission._asdict() for name, permission in permissions.items()})
 
-    def _try_cycles(self, state: CycleState) -> None:
+    def _try_cycles(self, state: CycleState, commands: Commands) -> None:
         """Compute cycles that nobody sees. Raises ValueError for models whose state does not fit into the ring."""
         packer = CyclePacker(Directions(self.settings.wires.scale.wires))
         for tick in range(1, _TRIAL_CYCLES + 1):
-            setpoint, state = step(state, self._inputs(tick), self.settings)
+            setpoint, state = step(state, self._inputs(tick, commands), self.settings)
             line, _ = setpoint.pack(self.packet_hash)
             # what effects remember may grow while the machine moves
             if len(packer.pack(setpoint, line)) > (most := self.cycles.longest_content // 2):
                 raise ValueError(f"a cycle, with what its effects remember, has more than {most} bytes")
 
-    def _inputs(self, tick: int) -> CycleInputs:
+    def _inputs(self, tick: int, commands: Commands) -> CycleInputs:
         snapshot = self.latest.snapshot(self.system.monotonic())
-        return CycleInputs(tick, snapshot, self.commands.zero, self.commands.target, self.commands.models)
+        return CycleInputs(tick, snapshot, commands.zero, commands.target, commands.models)
 
     def _state_left(self, models: Models, forget: bool) -> CycleState:
         """The state that the last cycle left: that cycle is computed once more.
