@@ -63,7 +63,7 @@ class World:
     Attributes
     ----------
     wires : by name of the line. shown : by gauge, changes what its device senses: (channel, true value) -> value.
-    told : every setpoint since the last `forget`.
+    told : every setpoint since the last `forget`. hearers : called with each setpoint and with what is true of it.
     """
 
     def __init__(self, hub: Hub, configuration: Configuration, truth: Truth, directory: Path, wires: dict[str, Wire]):
@@ -73,6 +73,7 @@ class World:
         self.wires = wires
         self.shown: dict[str, Callable[[str, float], float]] = {}
         self.told: list[Told] = []
+        self.hearers: list[Callable[[Setpoint, Told], None]] = []
         self._live = LiveWorld(truth, hub)
         self._directory = directory
         self._plug_in_devices()
@@ -257,9 +258,10 @@ class World:
                 error_um = 1e3 * float(np.linalg.norm(np.subtract(_tip_mm(setpoint, truth.tip_frame), true_mm)))
             moving = truth.phase == "moving"
         u_tip_um = math.nan if setpoint.u_tip_um is None else setpoint.u_tip_um
-        self.told.append(
-            Told(setpoint.time_s, setpoint.valid, setpoint.state, setpoint.reason, u_tip_um, error_um, moving)
-        )
+        told = Told(setpoint.time_s, setpoint.valid, setpoint.state, setpoint.reason, u_tip_um, error_um, moving)
+        self.told.append(told)
+        for hear in self.hearers:
+            hear(setpoint, told)
 
 
 def _tip_mm(setpoint: Setpoint, frame: str) -> np.ndarray:
