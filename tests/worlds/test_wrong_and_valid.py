@@ -10,7 +10,10 @@ import pytest
 
 from compd.simulation.truth.motion import DRIVES, Drives
 from tests.support.paths import CONFIG
-from tests.worlds.faults import line_of, lose_counts, scales, shift, silence, unplug
+from tests.worlds.faults.gauges import lose_counts, shift
+from tests.worlds.faults.lines import cable
+from tests.worlds.faults.replies import silent
+from tests.worlds.faults.wiring import line_of, scales
 from tests.worlds.world import World, built
 
 MACHINES = ("tripod-cmm.yaml", "hexapod.yaml")
@@ -29,7 +32,7 @@ def silent_until_the_drive_has_ended(world: World, rng: np.random.Generator) -> 
     world.drive(place_mm - np.sign(place_mm) * rng.uniform(3.0, 8.0))
     world.run(0.05)  # not at the departure, which the bound leaves out while the machine has rested for long
     since_s = world.forget()
-    silence(world, line_of(world, gauge), rng.uniform(0.3, 0.7))
+    silent(world, line_of(world, gauge), rng.uniform(0.3, 0.7))
     world.arrive()
     world.run(1.0)
     return since_s
@@ -40,7 +43,7 @@ def moved_while_all_scales_were_away(world: World, rng: np.random.Generator) -> 
     place_mm = begin(world, rng, 6.0)
     since_s, was_mm = world.forget(), world.scale_mm()
     for gauge in scales(world):
-        unplug(world, line_of(world, gauge), 2.0)
+        cable(world, line_of(world, gauge), 2.0)
     world.run(0.1)
     world.drive(place_mm - np.sign(place_mm) * rng.uniform(3.0, 15.0))
     world.arrive()

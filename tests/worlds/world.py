@@ -6,7 +6,6 @@ state on disk are the product's, unchanged, on a `VirtualSystem`. A seed gives t
 
 from __future__ import annotations
 
-import json
 import math
 import random
 import shutil
@@ -28,7 +27,7 @@ import yaml
 from compd.configuration import Configuration, load
 from compd.documents import read_document
 from compd.live.daemon import Daemon
-from compd.live.loop import Setpoint
+from compd.live.loop import Loop, Setpoint
 from compd.live.machine import MachineZero
 from compd.live.run_daemon import run_daemon
 from compd.plugins import SIMULATED_GAUGES
@@ -36,6 +35,7 @@ from compd.plugins import load as load_plugin
 from compd.setpoint_states import State
 from compd.simulation import World as Truth
 from compd.simulation.truth.motion import DRIVES, Drives
+from compd.simulation.truth.strengths import Strengths
 from compd.simulation.wires.server import STEP_S, LiveWorld, Sensing
 from tests.worlds.clients import Clients
 from tests.worlds.hub import Hub
@@ -76,7 +76,7 @@ class World:
     Attributes
     ----------
     wires : by name of the line. shown : by gauge, changes what its device senses: (channel, true value) -> value.
-    told : every setpoint since the last `forget`. observers : called with each one, and its line as it is sent.
+    told : every setpoint since the last `forget`. hearers : called with each setpoint and with what is true of it.
     clients : of the daemon. log : the last entries of its log. died : tracebacks in the daemon.
     """
 
@@ -86,7 +86,7 @@ class World:
         self.truth = truth
         self.shown: dict[str, Callable[[str, float], float]] = {}
         self.told: list[Told] = []
-        self.observers: list[Callable[[Told, bytes], None]] = []
+        self.hearers: list[Callable[[Setpoint, Told], None]] = []
         self.log: deque[Mapping[str, Any]] = deque(maxlen=_LOG_ENTRIES)
         self.directory = directory
         self.ports = VirtualPorts()
@@ -136,13 +136,6 @@ class World:
 
     def observe(self, daemon: Daemon) -> None:
         """A daemon has been made: this one, or the one of another configuration."""
-        put = daemon.setpoints.put
-
-        def seen(time_s: float, state: int, content: bytes) -> None:
-            put(time_s, state, content)
-            self._note(Setpoint.unpack(content).line)
-
-        daemon.setpoints.put = seen  # type: ignore[method-assign]
         self.daemon = daemon
         self._closing.append(daemon)
 
@@ -280,28 +273,24 @@ class World:
                 return True
         return False
 
-    def _note(self, line: bytes) -> None:
-        setpoint = json.loads(line)
+    def _note(self, setpoint: Setpoint) -> None:
         error_um = math.nan
         with self._live.now() as truth:
-            frame = f"tip_{truth.tip_frame}_mm"
-            if setpoint["valid"]:
+            if setpoint.values is not None:
                 true_mm = truth.look().tip_M if truth.tip_frame == "M" else truth.look().tip_P
-                error_um = 1e3 * math.dist(setpoint[frame], true_mm)
+                error_um = 1e3 * math.dist(_tip_mm(setpoint, truth.tip_frame), true_mm)
             moving = truth.phase == "moving"
-        u_tip_um = setpoint.get("u_tip_um", math.nan)
-        told = Told(
-            setpoint["time_s"],
-            setpoint["valid"],
-            State(setpoint["state"]),
-            setpoint.get("reason", ""),
-            math.hypot(*u_tip_um) if isinstance(u_tip_um, list) else u_tip_um,
-            error_um,
-            moving,
-        )
+        u_tip_um = math.nan if setpoint.u_tip_um is None else setpoint.u_tip_um
+        told = Told(setpoint.time_s, setpoint.valid, setpoint.state, setpoint.reason, u_tip_um, error_um, moving)
         self.told.append(told)
-        for observe in self.observers:
-            observe(told, line)
+        for hear in self.hearers:
+            hear(setpoint, told)
+
+
+def _tip_mm(setpoint: Setpoint, frame: str) -> np.ndarray:
+    values = setpoint.values
+    assert values is not None
+    return np.asarray(values.tip_M_mm if frame == "M" else values.tip_P_mm)
 
 
 @contextmanager
@@ -310,8 +299,12 @@ def built(
     seed: int,
     drives: Drives = DRIVES,
     change: Callable[[dict[str, Any]], None] = lambda document: None,
+    strengths: Callable[[Configuration], Strengths | None] = lambda configuration: None,
 ) -> Iterator[World]:
-    """A world of a configuration, at machine zero, ready. `change`: of its document before it is loaded."""
+    """A world of a configuration, at machine zero, ready.
+
+    change : of its document before it is loaded. strengths : of the errors of the machine.
+    """
     random.seed(seed)
     with ExitStack() as stack:
         directory = Path(tempfile.mkdtemp(prefix="compd-world-", dir="/dev/shm" if Path("/dev/shm").is_dir() else None))
@@ -325,19 +318,15 @@ def built(
             sockets.pop(other, None)
         (directory / path.name).write_text(yaml.safe_dump(document, sort_keys=False))
         configuration = load(directory / path.name)
-        truth = Truth(configuration.geometry, configuration.wiring, seed, zero_hold_s=1e9, drives=drives)
+        errors = strengths(configuration)
+        truth = Truth(
+            configuration.geometry, configuration.wiring, seed, zero_hold_s=1e9, strengths=errors, drives=drives
+        )
         hub = Hub(seed)
         world = World(hub, configuration, truth, directory)
         stack.enter_context(_logged(world))
 
-        class ObservedDaemon(Daemon):
-            """Tells the world of itself."""
-
-            def __init__(self, *arguments: Any, **named: Any) -> None:
-                super().__init__(*arguments, **named)
-                world.observe(self)
-
-        stack.enter_context(patch("compd.live.run_daemon.Daemon", ObservedDaemon))
+        stack.enter_context(_observed(world))
         stack.callback(hub.close)
         stack.callback(world.stop)
         world.start()
@@ -346,6 +335,26 @@ def built(
         assert world.until_ok(ZERO_WITHIN_S), (world.told[-1:], world.clients.answers, world.died)
         world.clients.watch(WATCHED_HZ)
         yield world
+
+
+@contextmanager
+def _observed(world: World) -> Iterator[None]:
+    """Daemons and loops tell their world of themselves."""
+
+    class ObservedDaemon(Daemon):
+        def __init__(self, *arguments: Any, **named: Any) -> None:
+            super().__init__(*arguments, **named)
+            world.observe(self)
+
+    class ObservedLoop(Loop):
+        def __init__(self, cycle: Any, latest: Any, commands: Any, sinks: Any, *arguments: Any) -> None:
+            super().__init__(cycle, latest, commands, [*sinks, world._note], *arguments)
+
+    with (
+        patch("compd.live.run_daemon.Daemon", ObservedDaemon),
+        patch("compd.live.processes.loop_process.Loop", ObservedLoop),
+    ):
+        yield
 
 
 @contextmanager
