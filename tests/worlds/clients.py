@@ -17,7 +17,7 @@ from tests.worlds.virtual_system import VirtualSystem
 PATIENCE_S = 30.0
 # Until a client that has lost its daemon tries again, s.
 AGAIN_S = 0.2
-_RECEIVE_BYTES = 1 << 16
+RECEIVE_BYTES = 1 << 16
 
 
 class Answer(NamedTuple):
@@ -94,7 +94,7 @@ class Clients:
             while until_s is None or system.monotonic() < until_s:
                 selector.select(None if until_s is None else until_s - system.monotonic())
                 try:
-                    data = connection.recv(_RECEIVE_BYTES)
+                    data = connection.recv(RECEIVE_BYTES)
                 except BlockingIOError:
                     continue
                 if not data:

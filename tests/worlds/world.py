@@ -32,12 +32,13 @@ from compd.live.machine import MachineZero
 from compd.live.run_daemon import run_daemon
 from compd.plugins import SIMULATED_GAUGES
 from compd.plugins import load as load_plugin
-from compd.setpoint_states import State
+from compd.setpoint_states import Mode, State
 from compd.simulation import World as Truth
 from compd.simulation.truth.motion import DRIVES, Drives
 from compd.simulation.truth.strengths import Strengths
 from compd.simulation.wires.server import STEP_S, LiveWorld, Sensing
 from tests.worlds.clients import Clients
+from tests.worlds.controller import Controller
 from tests.worlds.hub import Hub
 from tests.worlds.virtual_system import VirtualSystem
 from tests.worlds.wires import VirtualPorts, Wire
@@ -77,7 +78,7 @@ class World:
     ----------
     wires : by name of the line. shown : by gauge, changes what its device senses: (channel, true value) -> value.
     told : every setpoint since the last `forget`. hearers : called with each setpoint and with what is true of it.
-    clients : of the daemon. log : the last entries of its log. died : tracebacks in the daemon.
+    clients, controller : of the daemon. log : the last entries of its log. died : tracebacks in the daemon.
     """
 
     def __init__(self, hub: Hub, configuration: Configuration, truth: Truth, directory: Path) -> None:
@@ -94,6 +95,7 @@ class World:
         self.wires: dict[str, Wire] = {}
         self.clients = Clients(self.system, Path(configuration.sockets.unix.path))
         self.daemon: Daemon | None = None
+        self.controller = Controller(self.system, configuration, lambda scale_mm: self.drive(scale_mm.tolist()))
         self._on = False
         self._closing: list[Daemon] = []
         self._live = LiveWorld(truth, self.system)
@@ -277,14 +279,22 @@ class World:
         error_um = math.nan
         with self._live.now() as truth:
             if setpoint.values is not None:
-                true_mm = truth.look().tip_M if truth.tip_frame == "M" else truth.look().tip_P
-                error_um = 1e3 * math.dist(_tip_mm(setpoint, truth.tip_frame), true_mm)
+                error_um = 1e3 * math.dist(_tip_mm(setpoint, truth.tip_frame), _true_tip_mm(setpoint, truth))
             moving = truth.phase == "moving"
         u_tip_um = math.nan if setpoint.u_tip_um is None else setpoint.u_tip_um
         told = Told(setpoint.time_s, setpoint.valid, setpoint.state, setpoint.reason, u_tip_um, error_um, moving)
         self.told.append(told)
         for hear in self.hearers:
             hear(setpoint, told)
+
+
+def _true_tip_mm(setpoint: Setpoint, truth: Truth) -> np.ndarray:
+    """Where the tip is; in machine-tool mode where it were if the scales were at their setpoints."""
+    assert setpoint.values is not None
+    if setpoint.mode is Mode.MACHINE_TOOL:
+        return truth.tip_for(setpoint.values.scale_setpoint_mm.tolist())
+    state = truth.look()
+    return state.tip_M if truth.tip_frame == "M" else state.tip_P
 
 
 def _tip_mm(setpoint: Setpoint, frame: str) -> np.ndarray:
