@@ -14,11 +14,11 @@ from contextlib import ExitStack
 from dataclasses import dataclass
 from typing import Any
 
-from compd.clock import MonotonicClock
 from compd.gauge import Gauge
 from compd.lines.kinds.modbus_tcp.settings import ModbusTcpLine
 from compd.live.acquisition import Acquisition
 from compd.live.memory import Latest
+from compd.live.system import THIS_COMPUTER
 from compd.plugins import GAUGES, load
 from tests.benchmarks.figures import quiet, show
 from tests.benchmarks.limits import run_limited
@@ -77,7 +77,7 @@ class Run:
         share = UNITS // case.lines
         polled = list(gauges.items())
         on_lines = {f"l{k}": (line, polled[k * share : (k + 1) * share]) for k, line in enumerate(lines)}
-        self.acquisition = Acquisition(on_lines, dict.fromkeys(gauges, STALE_AFTER_S), self._latest, MonotonicClock())
+        self.acquisition = Acquisition(on_lines, dict.fromkeys(gauges, STALE_AFTER_S), self._latest, THIS_COMPUTER)
         self.counts = {"first": [0, 0], "then": [0, 0]}  # good, and all
 
     def look(self, now_s: float, died_s: float) -> None:
@@ -106,7 +106,7 @@ def main() -> None:
     parser.add_argument("seconds", nargs="?", type=float, default=SECONDS)
     seconds = parser.parse_args().seconds
     quiet()
-    clock, never = MonotonicClock(), threading.Event()
+    clock, never = THIS_COMPUTER, threading.Event()
     with ExitStack() as stack:
         runs = []
         for case in CASES:

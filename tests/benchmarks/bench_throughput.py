@@ -21,7 +21,6 @@ import tty
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
-from compd.clock import MonotonicClock
 from compd.commissioning.line_budget import budget_of_line
 from compd.gauge import Gauge
 from compd.line_settings import LATENCY_TIMER_S, serial_pace
@@ -30,7 +29,7 @@ from compd.lines.kinds.modbus_rtu.master import crc16
 from compd.lines.kinds.modbus_rtu.settings import ModbusRtuLine
 from compd.live.acquisition import Acquisition
 from compd.live.memory import Latest
-from compd.live.system import sharpen_timers
+from compd.live.system import THIS_COMPUTER, sharpen_timers
 from compd.plugins import GAUGES, load
 from tests.benchmarks.limits import run_limited
 
@@ -166,7 +165,7 @@ def _undisturbed(row: Row) -> Measured:
 
 def _polled(settings: ModbusRtuLine, polled: dict[str, Gauge[Any]]) -> tuple[float, float]:
     """Rounds per second, and processor time per round, s."""
-    line = open_line(settings, MonotonicClock())
+    line = open_line(settings, THIS_COMPUTER)
     try:
         for _ in range(3):
             _round(line, polled)
@@ -189,7 +188,7 @@ def _through_thread(settings: ModbusRtuLine, polled: dict[str, Gauge[Any]]) -> t
     """As `_polled`."""
     latest = Latest([f"{name}.{channel.name}" for name, gauge in polled.items() for channel in gauge.channels])
     acquisition = Acquisition(
-        {"x": (settings, list(polled.items()))}, dict.fromkeys(polled, 1.0), latest, MonotonicClock()
+        {"x": (settings, list(polled.items()))}, dict.fromkeys(polled, 1.0), latest, THIS_COMPUTER
     )
     acquisition.start()
     time.sleep(0.5)

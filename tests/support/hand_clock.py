@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import threading
 
+from compd.live.system import System
 
-class HandClock:
+
+class HandClock(System):
     """Time stands, until a test sets `now_s`; nothing may wait for it."""
 
     def __init__(self) -> None:

@@ -6,9 +6,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any
 
-from compd.clock import MonotonicClock
 from compd.gauge import Gauge
 from compd.live.acquisition import Acquisition, ReadingTrust
+from compd.live.system import THIS_COMPUTER
 from compd.plugins import GAUGES, load
 from tests.support.wire_rig import PATIENCE_S, SETTINGS, WatchedLatest
 
@@ -32,7 +32,7 @@ def acquiring(
     latest = WatchedLatest(channels)
     settings = SETTINGS.validate_python({"timeout_s": PATIENCE_S, "back_off_s": [0.05, 0.2], **line})
     lines = {"l": (settings, list(gauges.items()))}
-    acquisition = Acquisition(lines, dict.fromkeys(gauges, stale_after_s), latest, MonotonicClock(), trust=trust or {})
+    acquisition = Acquisition(lines, dict.fromkeys(gauges, stale_after_s), latest, THIS_COMPUTER, trust=trust or {})
     acquisition.start()
     try:
         yield acquisition, latest

@@ -8,11 +8,10 @@ import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from compd.clock import MonotonicClock
 from compd.configuration import Configuration
 from compd.live.daemon import Daemon
 from compd.live.supervisor import Supervisor
-from compd.live.system import ChildProcess, Notifier
+from compd.live.system import THIS_COMPUTER, ChildProcess, Notifier
 
 START_WITHIN_S = 30
 
@@ -23,7 +22,7 @@ def supervised(configuration: Configuration, notifier: Notifier | None = None) -
 
     What the daemon shares with them can be read and written here.
     """
-    clock = MonotonicClock()
+    clock = THIS_COMPUTER
     daemon = Daemon(configuration)
     notifier = notifier or Notifier("")
     supervisor = Supervisor(daemon, notifier, clock)

@@ -7,11 +7,12 @@ import math
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from compd.clock import Clock
 from compd.gauge import Channel, Gauge, LineFault, Quality, Reading, good
+from compd.lines import Ports
 from compd.live.acquisition.acquisition import LineThread
 from compd.live.memory import PollRequests
 from compd.live.service.message_keys.status import LineStatusKeys
+from compd.live.system import System
 from tests.support.wire_rig import PATIENCE_S, SETTINGS, InstantClock, WatchedLatest
 
 STALE_AFTER_S = 0.5
@@ -74,7 +75,7 @@ class ScriptedThread:
             poll_requests=self.poll_requests,
         )
 
-    def open(self, settings: Any, clock: Clock) -> CountingLine:
+    def open(self, settings: Any, system: System, ports: Ports) -> CountingLine:
         self.lines.append(CountingLine())
         return self.lines[-1]
 

@@ -9,7 +9,6 @@ import threading
 
 import numpy as np
 
-from compd.clock import MonotonicClock
 from compd.compensation import Compensation
 from compd.compensation.values import Contributions
 from compd.errors import StateError
@@ -17,6 +16,7 @@ from compd.live.loop import Commands, Setpoint
 from compd.live.memory import PollRequests, SharedRing
 from compd.live.service import Errands, Listeners, Messages, Publisher, RequestContext, Requests, TargetKeys, TcpAccess
 from compd.live.service.messages import line
+from compd.live.system import System
 from compd.model.kinematics import Frame
 from compd.operation_settings import SocketSettings
 from compd.setpoint_states import Mode, State
@@ -72,14 +72,14 @@ class Peer:
         self.socket.close()
 
 
-class SteppedClock:
+class SteppedClock(System):
     """The real clock, which a test can put forward."""
 
     def __init__(self):
         self.ahead_s = 0.0
 
     def monotonic(self):
-        return MonotonicClock().monotonic() + self.ahead_s
+        return super().monotonic() + self.ahead_s
 
     def step(self, step_s):
         self.ahead_s += step_s
@@ -127,7 +127,7 @@ class Service:
             cycles=SharedRing(),
             watch=LoopIsWell(),
             period_s=PERIOD_S,
-            clock=self.clock,
+            system=self.clock,
             observers=[self.observed.append],
         )
         self.requests = Requests(

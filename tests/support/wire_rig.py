@@ -17,6 +17,7 @@ from compd.line_settings import LineSettings
 from compd.lines import open_line
 from compd.lines.open import ANY_LINE
 from compd.live.memory import Latest
+from compd.live.system import System
 from compd.plugins import GAUGES, SIMULATED_GAUGES, load
 from compd.simulation.wires.simulated_line import SimulatedLine
 
@@ -27,7 +28,7 @@ Sense = Callable[[str], float]
 SETTINGS: TypeAdapter[LineSettings] = TypeAdapter(ANY_LINE)
 
 
-class InstantClock:
+class InstantClock(System):
     """Time passes only by waiting, and waiting takes no time. Notes how long each wait was to be."""
 
     def __init__(self) -> None:

@@ -18,7 +18,6 @@ from typer.testing import CliRunner
 
 from compd.cli.app import app
 from compd.cli.problems import print_problems
-from compd.clock import MonotonicClock
 from compd.configuration import load
 from compd.errors import CompdError
 from compd.fleet import find_recordings
@@ -36,6 +35,7 @@ from compd.live.record.replay import CYCLES_SUFFIX
 from compd.live.service import LastReadings
 from compd.live.service.last_readings import FILE_NAME as LAST_NAME
 from compd.live.service.request_context import read_token
+from compd.live.system import THIS_COMPUTER
 from compd.model.library import load_effects
 from compd.model_file import read_stored
 from compd.model_file.model_document import read_document as read_model_document
@@ -140,7 +140,7 @@ def _export(shape: str | None) -> Callable[[Path], object]:
 
 def _last_readings(path: Path) -> None:
     memory = TrustMemory(["scale_1.position"], [0.001])
-    LastReadings(path.parent, "", memory, MonotonicClock()).recall()
+    LastReadings(path.parent, "", memory, THIS_COMPUTER).recall()
 
 
 def _private(read: Callable[[Path], object]) -> Callable[[Path], object]:

@@ -15,10 +15,10 @@ import pytest
 import serial
 from serial.rfc2217 import PortManager
 
-from compd.clock import MonotonicClock
 from compd.gauge import LineFault, Quality
 from compd.lines import open_line
 from compd.live.acquisition import Acquisition
+from compd.live.system import THIS_COMPUTER
 from tests.support.ascii_gauge import gauge
 from tests.support.wire_rig import PATIENCE_S, SETTINGS, WatchedLatest
 
@@ -123,7 +123,7 @@ def test_a_gauge_behind_a_device_server_is_read_and_found_again(server: DeviceSe
     dial = gauge(**{"out": "?", "out_terminator": r"\r", "in": "%+07.3f", "in_terminator": r"\r\n"})
     latest = WatchedLatest(["dial.value"])
     lines = {"line": (settings(server.url), [("dial", dial)])}
-    acquisition = Acquisition(lines, {"dial": 5.0}, latest, MonotonicClock())
+    acquisition = Acquisition(lines, {"dial": 5.0}, latest, THIS_COMPUTER)
     acquisition.start()
     try:
         assert latest.wait_for("dial.value", Quality.OK).value == 1.25
@@ -140,5 +140,5 @@ def test_a_device_server_that_is_not_there_is_a_lost_line() -> None:
     with socket.create_server(("127.0.0.1", 0)) as listener:
         url = f"rfc2217://127.0.0.1:{listener.getsockname()[1]}"
     with pytest.raises(LineFault, match=url) as caught:
-        open_line(settings(url), MonotonicClock())
+        open_line(settings(url), THIS_COMPUTER)
     assert caught.value.quality is Quality.LINE_LOST

@@ -12,10 +12,10 @@ from typing import Any
 import pytest
 import structlog
 
-from compd.clock import MonotonicClock
 from compd.gauge import Quality
 from compd.live.acquisition.acquisition import Acquisition
 from compd.live.acquisition.shared_endpoints import Peers
+from compd.live.system import THIS_COMPUTER
 from tests.support.sampled import sampled
 from tests.support.wire_rig import PATIENCE_S, SETTINGS, Rig, WatchedLatest, rig
 from tests.unit.drivers.test_simulated import CASES, Case
@@ -39,7 +39,7 @@ def acquiring(*rigs: Rig) -> Iterator[tuple[Acquisition, WatchedLatest]]:
         name: (built.settings.model_copy(update={"back_off_s": BACK_OFF_S}), [(f"{name}g", built.gauges["g"])])
         for name, built in zip(names, rigs, strict=True)
     }
-    acquisition = Acquisition(lines, dict.fromkeys(gauges, STALE_AFTER_S), latest, MonotonicClock())
+    acquisition = Acquisition(lines, dict.fromkeys(gauges, STALE_AFTER_S), latest, THIS_COMPUTER)
     acquisition.start()
     try:
         yield acquisition, latest

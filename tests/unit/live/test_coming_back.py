@@ -15,7 +15,6 @@ from compd.live.acquisition.gauge_trust import GaugeTrust
 from compd.live.acquisition.possible_motion import GaugeSample
 from compd.live.machine.wiring import MachineWires
 from compd.live.memory.latest import Latest
-from compd.live.service import last_readings
 from compd.live.service.last_readings import LastReadings
 from compd.live.system import serial_names as port_names
 from compd.live.system.serial_names import changed_ports
@@ -208,7 +207,7 @@ def test_all_are_asked_for_after_the_computer_was_off_and_not_after_a_restart(sh
     shop.poll()
     assert not shop.not_believed
     shop._last._write_if_changed()
-    monkeypatch.setattr(last_readings, "boot_id", lambda: "another one")
+    monkeypatch.setattr(shop.clock, "boot_id", lambda: "another one")
     shop.restart(1.0)
     shop.poll()
     assert set(scales) <= set(shop.not_believed)

@@ -25,6 +25,7 @@ from compd.live.acquisition.possible_motion import MotionLimits
 from compd.live.acquisition.reading_trust import ReadingTrust, TrustSettings
 from compd.live.memory.latest import Latest
 from compd.live.memory.trust_memory import TrustMemory
+from compd.live.system import System
 from compd.plugins import SIMULATED_GAUGES
 from compd.plugins import load as load_plugin
 from compd.stated_noise import tolerance_mm
@@ -125,7 +126,7 @@ class Published(Latest):
         return total_s
 
 
-class EndingClock:
+class EndingClock(System):
     """The clock of a virtual wire, which calls `end` when its time has come."""
 
     end: Callable[[], None]

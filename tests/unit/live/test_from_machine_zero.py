@@ -16,6 +16,7 @@ from compd.live import daemon as daemon_module
 from compd.live.machine.machine_zero import MachineZero, load_zero
 from compd.live.machine.model_loader import Models
 from compd.live.service.zero_capture import ZeroCapture
+from compd.live.system import System
 from compd.setpoint_states import State
 from tests.support.live_machine import PERIOD_S, Machine, machine
 from tests.support.live_models import file_with, warm
@@ -25,7 +26,7 @@ PPM_PER_K = 11.5
 MACHINES = pytest.mark.parametrize(("name", "links"), [("tripod-cmm", 3), ("hexapod", 6)])
 
 
-class LiveClock:
+class LiveClock(System):
     """Time passes as whoever takes zero waits, and the gauges are read meanwhile."""
 
     def __init__(self, live: Machine) -> None:

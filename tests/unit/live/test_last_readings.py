@@ -10,19 +10,21 @@ import pytest
 
 from compd.gauge import good
 from compd.live.memory.trust_memory import Doubt, TrustMemory
-from compd.live.service import last_readings
 from compd.live.service.last_readings import FILE_NAME, LastReadings
+from compd.live.system import System
 from tests.unit.live.test_quantity_trust import judged
 
 CHANNELS = ("scale_1.position", "joints.1", "joints.2")
 HASH = "0123456789abcdef"
 
 
-class Clock:
+class Clock(System):
     """Every look is a second later; the test says how many there are."""
 
-    def __init__(self, looks: int = 0, now_s: float = 100.0) -> None:
+    def __init__(self, looks: int = 0, now_s: float = 100.0, boot_id: str = "") -> None:
+        """`boot_id`: of another start of the computer than this one."""
         self.now_s, self.looks = now_s, looks
+        self._boot_id = boot_id
 
     def monotonic(self) -> float:
         return self.now_s
@@ -31,6 +33,9 @@ class Clock:
         self.looks -= 1
         self.now_s += timeout_s
         return self.looks < 0
+
+    def boot_id(self) -> str:
+        return self._boot_id or super().boot_id()
 
 
 def memory() -> TrustMemory:
@@ -51,9 +56,9 @@ def written(tmp_path, change=lambda memory: None, now_s=100.0) -> None:
     last.stop()
 
 
-def recalled(tmp_path, now_s=103.0, zero_hash=HASH, ports=PORTS) -> TrustMemory:
+def recalled(tmp_path, now_s=103.0, zero_hash=HASH, ports=PORTS, boot_id="") -> TrustMemory:
     found = memory()
-    LastReadings(tmp_path, zero_hash, found, Clock(now_s=now_s), ports).recall()
+    LastReadings(tmp_path, zero_hash, found, Clock(now_s=now_s, boot_id=boot_id), ports).recall()
     return found
 
 
@@ -69,22 +74,23 @@ def test_every_gauge_must_show_what_it_showed_however_long_the_daemon_was_away(t
 
 
 def test_under_a_unit_that_hides_the_kernels_files_the_start_of_the_computer_is_the_same_one(tmp_path, monkeypatch):
-    monkeypatch.setenv("COMPD_BOOT_ID", last_readings.boot_id().replace("-", ""))
-    monkeypatch.setattr(last_readings, "_BOOT_ID", tmp_path / "hidden")
+    monkeypatch.setenv("COMPD_BOOT_ID", System().boot_id().replace("-", ""))
+    monkeypatch.setattr("compd.live.system.system._BOOT_ID", tmp_path / "hidden")
     written(tmp_path)
     monkeypatch.undo()
     assert not recalled(tmp_path).power_lost.any()
 
 
-def test_where_the_computer_was_started_anew_the_gauges_may_have_been_without_power(tmp_path, monkeypatch):
+def test_where_the_computer_was_started_anew_the_gauges_may_have_been_without_power(tmp_path):
     written(tmp_path)
-    monkeypatch.setattr(last_readings, "boot_id", lambda: "another one")
-    found = recalled(tmp_path)
+    found = recalled(tmp_path, boot_id="another one")
     assert found.power_lost[:2].all()
-    last = LastReadings(tmp_path, HASH, found, Clock(), PORTS)
+    last = LastReadings(tmp_path, HASH, found, Clock(boot_id="another one"), PORTS)
     last.start()
     last.stop()
-    assert recalled(tmp_path).power_lost[:2].all(), "nor is it forgotten before they have answered"
+    assert recalled(tmp_path, boot_id="another one").power_lost[:2].all(), (
+        "nor is it forgotten before they have answered"
+    )
 
 
 def test_a_gauge_at_another_port_is_not_believed_and_stays_so(tmp_path):

@@ -14,6 +14,7 @@ from compd.errors import StateError
 from compd.live.loop.commands import Commands
 from compd.live.loop.loop import Loop
 from compd.live.loop.timing import Histogram, LoopTiming
+from compd.live.system import System
 from compd.live.system.realtime import sleep_until
 from compd.operation_settings import LoopSettings
 from compd.setpoint_states import State
@@ -25,10 +26,12 @@ NO_ZERO = Commands(StateError.of("zero", "none"))
 TRIPOD = machine()
 
 
-class TurnedByHand:
+class TurnedByHand(System):
     """A clock and a sleeper: sleeping turns the clock, each cycle costs what the script says."""
 
-    def __init__(self, costs_s):
+    def __init__(self, costs_s, late_s=lambda: 0.0):
+        """`late_s`: by how much the next sleep is too long, s."""
+        self.late_s = late_s
         self.now_s = 10.0
         self.costs_s = iter(costs_s)
         self.woken_s = []
@@ -41,19 +44,20 @@ class TurnedByHand:
         return event.is_set()
 
     def sleep_until(self, time_s):
+        time_s += self.late_s()
         self.woken_s.append(time_s)
         self.now_s = max(self.now_s, time_s)
 
 
-def loop_with(sink, clock, sleep_until=sleep_until):
+def loop_with(sink, clock):
     """A loop whose machine has no zero, so that its cycles cost next to nothing."""
     cycle = replace(TRIPOD.settings, loop=LOOP)
-    return Loop(cycle, TRIPOD.latest, NO_ZERO, [sink], clock, sleep_until=sleep_until)
+    return Loop(cycle, TRIPOD.latest, NO_ZERO, [sink], clock)
 
 
 def run_cycles(costs_s, late_s=0.0):
     """Run one loop for as many cycles as there are costs; the loop, the setpoints' ticks and the clock."""
-    clock = TurnedByHand(costs_s)
+    clock = TurnedByHand(costs_s, lambda: late_s)
     ticks, done = [], []
 
     def sink(setpoint):
@@ -63,10 +67,7 @@ def run_cycles(costs_s, late_s=0.0):
         if len(ticks) == len(costs_s):
             done.append(True)
 
-    def sleep_until_late(time_s):
-        clock.sleep_until(time_s + late_s)
-
-    loop = loop_with(sink, clock, sleep_until_late)
+    loop = loop_with(sink, clock)
     loop.run(lambda: not done)
     return loop, ticks, clock
 
@@ -97,16 +98,13 @@ def test_a_late_wake_up_is_lateness_not_a_shift_of_the_grid():
 
 def test_a_loop_that_was_stopped_for_a_while_goes_on_at_the_tick_of_now():
     """SIGSTOP, or a computer that slept: the ticks that went by are missed, and none of them is computed late."""
-    clock = TurnedByHand([0.0] * 3)
     ticks = []
-
-    def stopped_once(time_s):
-        clock.sleep_until(time_s + (10.5 * PERIOD_S if len(ticks) == 1 else 0.0))
+    clock = TurnedByHand([0.0] * 3, lambda: 10.5 * PERIOD_S if len(ticks) == 1 else 0.0)
 
     def sink(setpoint):
         ticks.append(setpoint.seq)
 
-    loop = loop_with(sink, clock, stopped_once)
+    loop = loop_with(sink, clock)
     loop.run(lambda: len(ticks) < 3)
     assert ticks == [1, 12, 13]
     assert (loop.timing.cycles, loop.timing.missed) == (3, 10)
@@ -118,7 +116,7 @@ def test_a_loop_that_takes_over_stays_on_the_grid_and_counts_the_ticks_between()
     timing = LoopTiming(PERIOD_S)
     ticks = []
     for rounds in (2, 4):
-        loop = Loop(cycle, TRIPOD.latest, NO_ZERO, [lambda s: ticks.append(s.seq)], clock, timing, clock.sleep_until)
+        loop = Loop(cycle, TRIPOD.latest, NO_ZERO, [lambda s: ticks.append(s.seq)], clock, timing)
         loop.run(lambda rounds=rounds: len(ticks) < rounds)
         clock.now_s += 5.5 * PERIOD_S
     assert ticks == [1, 2, 7, 8]

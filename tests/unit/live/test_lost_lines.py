@@ -7,9 +7,10 @@ from typing import Any
 
 import structlog
 
-from compd.clock import Clock, MonotonicClock
 from compd.gauge import LineFault, Quality, Reading, good
+from compd.lines import Ports
 from compd.live.acquisition.acquisition import LineThread
+from compd.live.system import THIS_COMPUTER, System
 from tests.support.scripted_thread import SETTINGS_TCP, STALE_AFTER_S, CountingLine, ScriptedGauge, ScriptedThread
 from tests.support.wire_rig import PATIENCE_S, WatchedLatest
 
@@ -17,7 +18,7 @@ OK = Quality.OK
 
 
 def test_a_line_that_cannot_be_opened_is_tried_again_later_and_later() -> None:
-    def closed(settings: Any, clock: Clock) -> CountingLine:
+    def closed(settings: Any, system: System, ports: Ports) -> CountingLine:
         raise LineFault(Quality.LINE_LOST, "cannot open it")
 
     scripted = ScriptedThread(ScriptedGauge(lambda: []), opener=closed)
@@ -51,12 +52,12 @@ def test_a_lost_line_is_closed_and_made_anew_and_success_shortens_the_wait() -> 
 def test_a_library_that_raises_anything_loses_the_line_and_not_its_thread() -> None:
     tries = 0
 
-    def failing(settings: Any, clock: Clock) -> CountingLine:
+    def failing(settings: Any, system: System, ports: Ports) -> CountingLine:
         nonlocal tries
         tries += 1
         if tries <= 2:
             raise NotImplementedError("write_timeout is currently not supported")
-        return scripted.open(settings, clock)
+        return scripted.open(settings, system, ports)
 
     def poll() -> list[Reading]:
         scripted.thread.stop()
@@ -92,7 +93,7 @@ def test_a_line_that_fails_while_it_is_drained_or_closed_is_lost_too() -> None:
         scripted.thread.stop()
         return [good(1.0, scripted.clock.now_s)]
 
-    def opener(settings: Any, clock: Clock) -> CountingLine:
+    def opener(settings: Any, system: System, ports: Ports) -> CountingLine:
         scripted.lines.append(Broken())
         return scripted.lines[-1]
 
@@ -104,14 +105,14 @@ def test_a_line_that_fails_while_it_is_drained_or_closed_is_lost_too() -> None:
 def test_stopping_cuts_a_back_off_short() -> None:
     tried = threading.Event()
 
-    def closed(settings: Any, clock: Clock) -> CountingLine:
+    def closed(settings: Any, system: System, ports: Ports) -> CountingLine:
         tried.set()
         raise LineFault(Quality.LINE_LOST, "no")
 
     settings = SETTINGS_TCP.model_copy(update={"back_off_s": (1e6, 1e6)})
     latest = WatchedLatest(["g.c0"])
     gauges = [("g", ScriptedGauge(lambda: []))]
-    thread = LineThread("line", settings, gauges, {"g": STALE_AFTER_S}, latest, MonotonicClock(), closed)
+    thread = LineThread("line", settings, gauges, {"g": STALE_AFTER_S}, latest, THIS_COMPUTER, closed)
     thread.start()
     assert tried.wait(PATIENCE_S)
     thread.stop()

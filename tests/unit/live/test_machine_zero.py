@@ -19,6 +19,7 @@ from compd.live.machine.machine_zero import FILE_NAME, OLD_FILE_NAME, MachineZer
 from compd.live.machine.wiring import MachineWires
 from compd.live.memory.latest import Latest
 from compd.live.service.zero_capture import REST_TOLERANCE_MM, ZeroCapture
+from compd.live.system import System
 from tests.support.paths import ROOT
 
 CONFIG = ROOT / "config" / "tripod-cmm.yaml"
@@ -104,7 +105,7 @@ def test_the_hash_is_of_geometry_gauges_and_wiring_only():
     assert replace(configuration, wiring=rewired).zero_hash != configuration.zero_hash
 
 
-class Taking:
+class Taking(System):
     """A zero being taken: the clock moves only when the taker waits, and the gauges are read each time."""
 
     def __init__(self, directory):
@@ -351,12 +352,11 @@ def test_the_end_does_not_wait_for_a_disk_that_hangs(tmp_path, monkeypatch):
     taking = Taking(tmp_path)
     saving, disk = threading.Event(), threading.Event()
 
-    def save(zero, directory):
+    def write_files(contents):
         saving.set()
         disk.wait()
-        return directory
 
-    monkeypatch.setattr(MachineZero, "save", save)
+    monkeypatch.setattr(taking, "write_files", write_files)
     monkeypatch.setattr("compd.live.service.zero_capture._END_WITHIN_S", 0.01)
     taking.taker.start(False, taking.answers.append)
     assert saving.wait(20)

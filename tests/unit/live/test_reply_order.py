@@ -14,11 +14,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from compd.clock import Clock
 from compd.conformance.faults import Piece
 from compd.conformance.virtual import TURNAROUND_S, VirtualClock, VirtualWire
 from compd.gauge import Gauge, Quality, Reading, replies_tell_whose
+from compd.lines import Ports
 from compd.live.acquisition.acquisition import LineThread
+from compd.live.system import System
 from compd.plugins import GAUGES, load
 from tests.support.sampled import sampled
 from tests.support.wire_rig import PATIENCE_S, SETTINGS, WatchedLatest
@@ -61,7 +62,7 @@ def comparator(unit: int, form: str = "%+09.4f") -> Gauge[Any]:
     return driver(driver.Options.model_validate(options))
 
 
-class EndingClock:
+class EndingClock(System):
     """The clock of a virtual wire, which calls `end` once its time has come."""
 
     def __init__(self, clock: VirtualClock, until_s: float, end: Callable[[], None]) -> None:
@@ -108,7 +109,7 @@ class Run:
         settings = SETTINGS_TCP.model_copy(update={"timeout_s": timeout_s})
         clock = EndingClock(self.wire.clock, self.wire.clock.now_s + seconds, self._end)
 
-        def opener(settings: Any, clock: Clock) -> Any:
+        def opener(settings: Any, system: System, ports: Ports) -> Any:
             return self.wire.open()
 
         named = list(zip(self.names, gauges, strict=True))

@@ -13,7 +13,6 @@ import pytest
 from pydantic import ValidationError
 from pymodbus.framer.rtu import FramerRTU
 
-from compd.clock import MonotonicClock
 from compd.gauge import Channel, Gauge, LineFault, Quality, Reading, good
 from compd.lines import RtuMaster, StreamLine
 from compd.live.acquisition.acquisition import Acquisition, LineThread
@@ -21,6 +20,7 @@ from compd.live.acquisition.possible_motion import MotionLimits
 from compd.live.acquisition.reading_trust import ReadingTrust, TrustSettings
 from compd.live.acquisition.round_trigger import read_latched
 from compd.live.memory.trust_memory import TrustMemory
+from compd.live.system import THIS_COMPUTER
 from tests.support.wire_rig import PATIENCE_S, SETTINGS, InstantClock, Rig, ScriptedPort, WatchedLatest, rig
 
 OK = Quality.OK
@@ -90,7 +90,7 @@ class Replies(dict[str, float]):
 def acquiring(device_rig: Rig) -> Iterator[tuple[LineThread, WatchedLatest]]:
     latest = WatchedLatest([f"{name}.v" for name in device_rig.gauges])
     lines = {"line": (device_rig.settings, list(device_rig.gauges.items()))}
-    acquisition = Acquisition(lines, dict.fromkeys(device_rig.gauges, 5.0), latest, MonotonicClock())
+    acquisition = Acquisition(lines, dict.fromkeys(device_rig.gauges, 5.0), latest, THIS_COMPUTER)
     acquisition.start()
     try:
         yield acquisition.lines["line"], latest

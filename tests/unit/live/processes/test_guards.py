@@ -13,7 +13,6 @@ from types import SimpleNamespace
 
 import pytest
 
-from compd.clock import MonotonicClock
 from compd.live.loop.setpoint import Setpoint
 from compd.live.loop_succession import LoopSuccession
 from compd.live.memory.control import Control, Phase
@@ -22,7 +21,9 @@ from compd.live.processes.heartbeat import Heartbeat, RestartDelay
 from compd.live.processes.loop_process import ModelChange
 from compd.live.processes.service_process import StateLog
 from compd.live.service.loop_watch import LoopWatch
-from compd.live.system.child_process import OUT_OF_MEMORY, ChildProcess
+from compd.live.system import THIS_COMPUTER
+from compd.live.system.child_process import ChildProcess
+from compd.live.system.forked_process import OUT_OF_MEMORY
 from compd.live.system.realtime import RationedPriority, thread_time_s
 from compd.setpoint_states import Mode, State
 
@@ -32,6 +33,11 @@ def ring():
     made = SharedRing()
     yield made
     made.close()
+
+
+def takes_turn(control, loop):
+    """Whether the turn comes to this loop, which waits for it."""
+    return control.await_turn(loop, 60, THIS_COMPUTER.selector)
 
 
 @pytest.mark.parametrize(("period_s", "limit_s"), [(0.001, 0.016), (0.005, 0.016), (0.02, 0.032), (1.0, 1.6)])
@@ -107,7 +113,7 @@ def test_a_process_starts_anew_at_once_then_after_waits_that_double():
     ],
 )
 def test_a_process_says_how_it_ended(work, end):
-    child = ChildProcess("child", work, MonotonicClock())
+    child = ChildProcess("child", work, THIS_COMPUTER)
     child.start()
     assert child.running
     child.wait()
@@ -120,7 +126,7 @@ def test_a_process_says_how_it_ended(work, end):
 
 def test_a_process_leaves_the_supervisors_signals_alone_and_can_be_killed_while_stopped():
     control = Control()
-    child = ChildProcess("child", lambda: control.await_turn(5, 60), MonotonicClock())
+    child = ChildProcess("child", lambda: takes_turn(control, 5), THIS_COMPUTER)
     child.start()
     while not control.successor:
         pass
@@ -137,14 +143,14 @@ def test_the_turn_goes_to_the_successor_that_waits_and_to_nobody_else():
     control = Control()
     control.give_turn(1)
     assert control.keeps_turn(1)
-    child = ChildProcess("child", lambda: os._exit(7 if control.await_turn(2, 60) else 8), MonotonicClock())
+    child = ChildProcess("child", lambda: os._exit(7 if takes_turn(control, 2) else 8), THIS_COMPUTER)
     child.start()
     while control.keeps_turn(1):
         pass
     child.wait()
     assert child.last_end == "ended with code 7"
     assert control.turn == 2
-    assert not control.await_turn(3, 0.01), "nobody gives it"
+    assert not control.await_turn(3, 0.01, THIS_COMPUTER.selector), "nobody gives it"
     assert control.successor == 0
     control.enter(Phase.STOPPING, "the end")
     assert not control.keeps_turn(2)
@@ -164,7 +170,7 @@ def test_a_process_may_have_none_of_the_sockets():
 
         ends = []
         for keeps in (True, False):
-            child = ChildProcess("child", has_socket, MonotonicClock(), keeps_sockets=keeps)
+            child = ChildProcess("child", has_socket, THIS_COMPUTER, keeps_sockets=keeps)
             child.start()
             child.wait()
             ends.append(child.last_end)
@@ -186,10 +192,10 @@ def test_a_request_is_answered_where_the_successor_ends_with_the_turn_and_withou
     process = SimpleNamespace(
         control=control,
         run=lambda number, forget: None,
-        run_successor=lambda number, change: os._exit(9 if control.await_turn(number, 60) else 8),
+        run_successor=lambda number, change: os._exit(9 if takes_turn(control, number) else 8),
         answer=lambda *answer: control.model_answer.write(answer),
     )
-    loops = LoopSuccession(process, MonotonicClock(), None)
+    loops = LoopSuccession(process, THIS_COMPUTER, None)
     loops.start()
     loops.loop.wait()
     loops.start_successor(ModelChange(3, None, False))

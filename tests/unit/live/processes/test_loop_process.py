@@ -6,7 +6,6 @@ from dataclasses import replace
 
 import pytest
 
-from compd.clock import MonotonicClock
 from compd.gauge import Quality
 from compd.live.loop.adopted_models import AdoptedModels
 from compd.live.loop.ring_entries import CyclePacker, Directions
@@ -15,6 +14,7 @@ from compd.live.machine.model_loader import Models, ModelText
 from compd.live.memory.control import Control
 from compd.live.memory.shared_ring import SharedRing
 from compd.live.processes.loop_process import LoopProcess, ModelChange
+from compd.live.system import THIS_COMPUTER
 from compd.setpoint_states import State
 from tests.support.live_machine import STEP_MM, machine
 from tests.support.live_models import file_with
@@ -40,7 +40,7 @@ class Predecessor:
             self.cycles,
             None,
             self.control,
-            MonotonicClock(),
+            THIS_COMPUTER,
         )
 
     def step(self):

@@ -9,11 +9,12 @@ import pytest
 
 from compd.live.memory.trust_memory import Doubt, TrustMemory
 from compd.live.service.acceptance import WATCHED_S, Acceptance
+from compd.live.system import System
 
 CHANNELS = ("scale_1.position", "joints.1", "joints.2")
 
 
-class AcquisitionClock:
+class AcquisitionClock(System):
     """Virtual time, in which the acquisition does something at each look: `acts` are called with the time, s."""
 
     def __init__(self, *acts):

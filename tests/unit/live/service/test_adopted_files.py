@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import pytest
 
-from compd.clock import MonotonicClock
 from compd.errors import StateError
 from compd.live import loop_succession
 from compd.live.loop_succession import LoopSuccession
 from compd.live.memory.control import Control
 from compd.live.processes.loop_process import ModelChange
+from compd.live.system import THIS_COMPUTER
 from compd.model_file.model_document import read_document
 
 
@@ -56,10 +56,10 @@ def test_a_loop_that_is_never_ready_with_its_model_is_ended_and_the_request_answ
         def answer(self, *answer):
             control.model_answer.write(answer)
 
-    loops = LoopSuccession(Endless(), MonotonicClock(), None)
+    loops = LoopSuccession(Endless(), THIS_COMPUTER, None)
     loops.start_successor(ModelChange(4, None, False))
     while control.model_answer.read() is None:
-        loops.end_late_successor(MonotonicClock().monotonic())
+        loops.end_late_successor(THIS_COMPUTER.monotonic())
         loops.collect(4)
     number, summary, refusal = control.model_answer.read()
     assert (number, summary) == (4, None)

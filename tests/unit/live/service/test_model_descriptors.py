@@ -21,6 +21,7 @@ from compd.live.service.client_session import ClientSession
 from compd.live.service.descriptor_bin import DescriptorBin
 from compd.live.service.messages import ProtocolError
 from compd.live.service.model_switch import ModelSwitch, ModelWish
+from compd.live.system import THIS_COMPUTER
 from tests.support.service import SteppedClock
 
 TEXT = b"format: 1\n"
@@ -35,7 +36,7 @@ class Pair:
 
     def __init__(self):
         ours, self.client = socket.socketpair(socket.AF_UNIX)
-        self.bin = DescriptorBin()
+        self.bin = DescriptorBin(THIS_COMPUTER)
         self.session = ClientSession(ours, "unix", local=True, unwanted=self.bin)
 
     def send(self, content, *descriptors):
