@@ -1,23 +1,25 @@
-"""Clients of a world's daemon: real sockets, whose waiting is virtual."""
+"""Clients of a world's daemon: persons who ask, a program that watches, and one that records."""
 
 from __future__ import annotations
 
 import json
-import os
-import socket
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from pathlib import Path
-from selectors import EVENT_READ
 from typing import Any, NamedTuple
 
+from compd.configuration import Configuration
+from compd.errors import DaemonError
+from compd.live.record import ReadingsFeed, Recorder, RecordingLimits
+from tests.worlds.connection import Connection
 from tests.worlds.virtual_system import VirtualSystem
 
 # Longest time (s) for which a person waits for an answer: a model may take the loop's successor some seconds.
 PATIENCE_S = 30.0
 # Until a client that has lost its daemon tries again, s.
 AGAIN_S = 0.2
-RECEIVE_BYTES = 1 << 16
+# Of a recording: no part is closed for its size or age.
+_LIMITS = RecordingLimits(10**9, 1e9, 10**10, drop_oldest=False)
 
 
 class Answer(NamedTuple):
@@ -44,78 +46,110 @@ class Clients:
 
     def ask(self, message: dict[str, Any], file: Path | None = None) -> None:
         """Send a request; the answer comes into `answers`. `file`: whose descriptor goes along."""
+        expected = (message["class"], "ERROR")
 
         def converse() -> None:
             reply = None
-            with suppress(OSError):  # nobody listens, or the daemon has gone
-                replies = (one for one in self._lines(message, file, PATIENCE_S) if one["class"] in expected)
-                reply = next(replies, None)
+            with suppress(OSError), Connection(self._system, self._path) as connection:
+                connection.send(message, file)
+                answers = connection.messages(self._system.monotonic() + PATIENCE_S)
+                reply = next((one for one in answers if one["class"] in expected), None)
             self.answers.append(Answer(self._system.monotonic(), message["class"], reply))
 
-        expected = (message["class"], "ERROR")
         self._start(converse)
 
-    def watch(self, rate_hz: float) -> Watcher:
+    def watch(self, rate_hz: float) -> None:
         """A program that wants setpoints, and comes again when the daemon has gone."""
-        watcher = Watcher()
 
         def follow() -> None:
             while True:
-                with suppress(OSError):
-                    for message in self._lines({"class": "WATCH", "rate_hz": rate_hz}, None, None):
-                        if message["class"] == "SETPOINT":
-                            watcher.take(message)
+                with suppress(OSError), Connection(self._system, self._path) as connection:
+                    connection.send({"class": "WATCH", "rate_hz": rate_hz})
+                    for _ in connection.messages():
+                        pass
                 self._system.sleep_until(self._system.monotonic() + AGAIN_S)
 
         self._start(follow)
-        return watcher
+
+    def record(self, name: Path, configuration: Configuration) -> Recording:
+        """A program that records the readings of every cycle."""
+        recording = Recording(self._system, self._path, name, configuration)
+        self._start(recording.run)
+        return recording
 
     def _start(self, run: Callable[[], None]) -> None:
         self._numbers += 1
         self._system.start(run, f"client {self._numbers}")
 
-    def _lines(self, request: dict[str, Any], file: Path | None, within_s: float | None) -> Iterator[dict[str, Any]]:
-        """Send a request and iterate over the lines that come. Raises OSError where nobody listens."""
-        system, received = self._system, b""
-        until_s = None if within_s is None else system.monotonic() + within_s
-        with socket.socket(socket.AF_UNIX) as connection, system.selector() as selector:
-            connection.connect(str(self._path))
-            connection.setblocking(False)
-            selector.register(connection, EVENT_READ)
-            line = json.dumps(request).encode() + b"\n"
-            if file is None:
-                connection.sendall(line)
-            else:
-                descriptor = os.open(file, os.O_RDONLY | os.O_CLOEXEC)
-                try:
-                    socket.send_fds(connection, [line], [descriptor])
-                finally:
-                    os.close(descriptor)
-            while until_s is None or system.monotonic() < until_s:
-                selector.select(None if until_s is None else until_s - system.monotonic())
-                try:
-                    data = connection.recv(RECEIVE_BYTES)
-                except BlockingIOError:
-                    continue
-                if not data:
-                    return
-                *lines, received = (received + data).split(b"\n")
-                yield from map(json.loads, lines)
+
+class _EndedByPerson(Exception):
+    """Somebody presses Ctrl-C."""
 
 
-class Watcher:
-    """What a program has seen of the setpoints.
+class Recording:
+    """`compd recording start`, in a world.
 
     Attributes
     ----------
-    seen : how many. last : the newest.
+    done : whether its files are closed. summary : what it says at its end. said : what it has said before.
     """
 
-    def __init__(self) -> None:
-        self.seen = 0
-        self.last: dict[str, Any] = {}
+    def __init__(self, system: VirtualSystem, path: Path, name: Path, configuration: Configuration) -> None:
+        self.done = False
+        self.summary = ""
+        self.said: list[str] = []
+        self._system = system
+        self._path = path
+        self._name = name
+        self._configuration = configuration
+        self._ends = False
 
-    def take(self, message: dict[str, Any]) -> None:
-        """A setpoint has come."""
-        self.seen += 1
-        self.last = message
+    def end(self) -> None:
+        """A person ends it; it is done soon after that."""
+        self._ends = True
+
+    def run(self) -> None:
+        """As the command does."""
+        feed = ReadingsFeed(self._connect, None, self.said.append, self._system)
+        recorder = Recorder(
+            self._name, *feed.first_messages, _LIMITS, self.said.append, self._system, configuration=self._configuration
+        )
+        recorder.start()
+        try:
+            with suppress(_EndedByPerson):
+                recorder.follow(feed.messages())
+        finally:
+            recorder.close()
+            self.summary, self.done = recorder.summary(), True
+
+    def _connect(self) -> _Readings:
+        try:
+            return _Readings(Connection(self._system, self._path), lambda: self._ends, self._system)
+        except OSError as error:
+            raise DaemonError.of("the daemon", str(error)) from error
+
+
+class _Readings:
+    """What `ReadingsFeed` needs of a client."""
+
+    def __init__(self, connection: Connection, ends: Callable[[], bool], system: VirtualSystem) -> None:
+        self._connection = connection
+        self._ends = ends
+        self._system = system
+        self.version = next(connection.messages())
+
+    def readings(self, rate_hz: float | None = None) -> Iterator[tuple[bytes, dict[str, Any]]]:
+        """The lines that come, as `compd.client.Client.readings`."""
+        asked = {} if rate_hz is None else {"rate_hz": rate_hz}
+        self._connection.send({"class": "WATCH", "what": "readings", **asked})
+        try:
+            while not self._ends():
+                if line := self._connection.line(self._system.monotonic() + AGAIN_S):
+                    yield line, json.loads(line)
+        except OSError as error:
+            raise DaemonError.of("the daemon", str(error)) from error
+        raise _EndedByPerson
+
+    def close(self) -> None:
+        """Close the connection."""
+        self._connection.close()

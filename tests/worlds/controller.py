@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 import json
-import socket
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
-from selectors import EVENT_READ
 from typing import Any
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from compd.configuration import Configuration
-from tests.worlds.clients import AGAIN_S, RECEIVE_BYTES
+from tests.worlds.clients import AGAIN_S
+from tests.worlds.connection import Connection
 from tests.worlds.virtual_system import VirtualSystem
 
 # Targets per second.
@@ -87,27 +86,18 @@ class Controller:
             self._system.sleep_until(self._system.monotonic() + AGAIN_S)
 
     def _control(self) -> None:
-        system, period_s, received = self._system, 1.0 / RATE_HZ, b""
-        with socket.socket(socket.AF_UNIX) as connection, system.selector() as selector:
-            connection.connect(str(self._path))
-            connection.sendall(json.dumps({"class": "WATCH", "rate_hz": RATE_HZ}).encode() + b"\n")
-            connection.setblocking(False)
-            selector.register(connection, EVENT_READ)
+        system, period_s = self._system, 1.0 / RATE_HZ
+        with Connection(system, self._path) as connection:
+            connection.send({"class": "WATCH", "rate_hz": RATE_HZ})
             due_s = system.monotonic()
             while self.on:
                 if system.monotonic() >= due_s:
                     due_s += period_s
                     self._advance(period_s)
                     if system.monotonic() >= self._silent_until_s:
-                        connection.sendall(json.dumps(self._target()).encode() + b"\n")
-                selector.select(max(0.0, due_s - system.monotonic()))
-                with suppress(BlockingIOError):
-                    data = connection.recv(RECEIVE_BYTES)
-                    if not data:
-                        return
-                    *lines, received = (received + data).split(b"\n")
-                    for line in lines[-1:]:
-                        self._take(json.loads(line))
+                        connection.send(self._target())
+                if line := connection.line(due_s):
+                    self._take(json.loads(line))
 
     def _advance(self, time_s: float) -> None:
         way_mm = self._goal_mm - self.tip_mm
