@@ -8,6 +8,7 @@ import numpy as np
 
 from compd.arrays import FloatArray
 from compd.simulation.truth.closure import Posture, homogeneous
+from compd.simulation.truth.joint_kernels import add_waves, find_angles
 from compd.simulation.truth.mechanism import Mechanism
 from compd.simulation.truth.strengths import Strengths
 
@@ -41,7 +42,6 @@ class Runout:
         self._phase_rad = rng.uniform(0, 2 * np.pi, shape)
         scatter = rng.uniform(0.5, 1.0, shape)  # from ball to ball
         self._amplitude_mm = scatter * amplitude_um[:, None, None] * UM * _HARMONIC_SHARES[:, None]
-        self._order = 1.0 + np.arange(len(_HARMONIC_SHARES))[:, None]
         self._at_zero = self._wave(np.zeros((joints, 2)))
 
     def displacement_mm(self, angles_rad: FloatArray) -> FloatArray:
@@ -49,8 +49,9 @@ class Runout:
         return self._wave(angles_rad) - self._at_zero
 
     def _wave(self, angles_rad: FloatArray) -> FloatArray:
-        turned = self._order * angles_rad[:, None, None, :] + self._phase_rad
-        return np.asarray((self._amplitude_mm * np.cos(turned)).sum(axis=(2, 3)))
+        wave_mm = np.zeros((len(angles_rad), 3))
+        add_waves(self._amplitude_mm, self._phase_rad, angles_rad, wave_mm)
+        return wave_mm
 
 
 class Joints:
@@ -111,8 +112,9 @@ def triads(directions: FloatArray, axes: FloatArray | None) -> FloatArray:
 
 def angles(axes: FloatArray, directions: FloatArray) -> FloatArray:
     """(n, 2) angles by which links have turned since machine zero; `axes` as from `triads`."""
-    along, first, second = np.einsum("nij,nj->in", axes, directions)
-    return np.stack([np.arctan2(first, along), np.arctan2(second, along)], axis=1)
+    turned_rad = np.empty((len(axes), 2))
+    find_angles(axes, directions, turned_rad)
+    return turned_rad
 
 
 def _across(triads: FloatArray, displacement: FloatArray) -> FloatArray:

@@ -62,7 +62,7 @@ class Mechanism:
         )
         self._ways = [_Way(actuator) for actuator in parts.actuators]
         self.extended: NDArray[np.bool_] = np.array([self._ways[a].extends for a in self.scale_of_link])
-        self._all_extended = bool(self.extended.all())
+        self.moves_base = not self.extended.all()
         # links that extend one by one, with the platform's hinges on them in order: posture and lengths follow directly
         self.extends_alone = bool(
             self.extended.all()
@@ -158,7 +158,7 @@ class Mechanism:
         """
         axes = self._base_axes(supports_M)
         joints_M: FloatArray = supports_M[self.support_of_joint] + (1 + stretch) * self.joint_offsets_B @ axes
-        if scale_mm is None or self._all_extended:
+        if scale_mm is None or not self.moves_base:
             return joints_M
         moved_M: FloatArray = joints_M + self._displacements_B(self._zero_mm + scale_mm) @ axes
         return moved_M
