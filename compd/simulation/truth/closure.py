@@ -21,7 +21,7 @@ from compd.simulation.truth.closure_kernels import (
     MAX_ITERATIONS,
     PLATFORM_RADIUS_MM,
     close,
-    find_multipliers,
+    find_forces,
 )
 
 # (4, 3): the platform's origin in {M}, mm, and its x, y, z axes in {M}.
@@ -185,16 +185,14 @@ class Closure:
         Returns axial (n,), N, tension positive, and (n, 3) the lateral force in {M}, N, that each link's
         base ball takes from the link (tripod: along its revolute axis; hexapod: none).
         """
-        multipliers = sum((np.outer(homogeneous(at_P), force_M) for force_M, at_P in loads), np.zeros((4, 3))).ravel()
-        if not find_multipliers(
-            *self._parts(joints_P), np.ascontiguousarray(base_M), np.ascontiguousarray(posture), multipliers
-        ):
+        load = np.zeros((4, 3))
+        for force_M, at_P in loads:
+            load += homogeneous(at_P)[:, None] * force_M
+        multipliers, lateral_M = load.ravel(), np.zeros(base_M.shape)
+        base_M, posture = np.ascontiguousarray(base_M), np.ascontiguousarray(posture)
+        if not find_forces(*self._parts(joints_P), base_M, posture, multipliers, lateral_M):
             raise np.linalg.LinAlgError("Singular matrix")
-        n = len(base_M)
-        lateral = multipliers[n : n + len(self.axes)]
-        lateral_M = np.zeros((n, 3))
-        np.add.at(lateral_M, self.link_of_axis, lateral[:, None] * (self.axes @ posture + self.fixed_M))
-        return multipliers[:n], lateral_M
+        return multipliers[: len(base_M)], lateral_M
 
 
 class _Joints:

@@ -177,8 +177,8 @@ def close(
     return False
 
 
-@loop([ROWS, ROWS, ROWS, INDICES, ROWS, ROWS, NUMBERS])
-def find_multipliers(
+@loop([ROWS, ROWS, ROWS, INDICES, ROWS, ROWS, NUMBERS, ROWS])
+def find_forces(
     rows: FloatArray,
     axes: FloatArray,
     fixed_M: FloatArray,
@@ -186,8 +186,18 @@ def find_multipliers(
     base_M: FloatArray,
     posture: FloatArray,
     load: FloatArray,
+    lateral_M: FloatArray,
 ) -> bool:
-    """Turn `load` (12,), N, into the multipliers of links, revolute joints and rigidity; False where there are none."""
+    """The multipliers of the equations for `load` (12,), N, into its place; False where there are none.
+
+    lateral_M : (n, 3) that of each link's revolute joint along its axis, N, is added.
+    """
     value, gradient = np.empty(_UNKNOWNS), np.empty((_UNKNOWNS, _UNKNOWNS))
     _equations(rows, axes, fixed_M, link_of_axis, base_M, load[:0], posture, value, gradient)
-    return _solve(gradient.T.copy(), load)
+    if not _solve(gradient.T.copy(), load):
+        return False
+    axes_M = _product(axes, posture) + fixed_M
+    for a in range(len(axes)):
+        for d in range(3):
+            lateral_M[link_of_axis[a], d] += load[len(rows) + a] * axes_M[a, d]
+    return True

@@ -105,9 +105,8 @@ class Equilibrium:
         total_N, total_lateral_M = self._forces(closure, posture, base_M, joints_P, force_M_N)
         axial_N, lateral_M = total_N - self._axial0_N, total_lateral_M - self._lateral0_M
 
-        pull_M = np.zeros((3, 3))
         directions_M = link_directions(base_M, homogeneous(joints_P) @ posture)
-        np.add.at(pull_M, machine.support_of_joint, axial_N[:, None] * directions_M + lateral_M)
+        pull_M = machine.carries @ (axial_N[:, None] * directions_M + lateral_M)
         supports_M = unloaded_M + self._frame.give_M(pull_M)
         balls = self._joints.balls(posture, directions_M, axial_N, lateral_M)
         inputs = CauseInputs(
@@ -144,7 +143,7 @@ class Equilibrium:
             link_mm,
             posture,
         )
-        if np.sum(posture[3] * machine.posture0[3]) < MIN_UPRIGHT:
+        if posture[3] @ machine.posture0[3] < MIN_UPRIGHT:
             raise KinematicsError.of(
                 "simulated machine",
                 "the platform would tip over at these scale values",

@@ -36,6 +36,8 @@ class Mechanism:
         supports_B = np.array(base.supports_B_mm) if base.supports_B_mm else _triangle_about(joints_B)
         self.supports0_M: FloatArray = origin_M + supports_B @ self.rotation_M_B0.T
         self.support_of_joint: NDArray[np.intp] = np.array(base.support_of_joint or [1] * self.links) - 1
+        # (3, n) 1 where a support has a joint
+        self.carries: FloatArray = np.eye(3)[:, self.support_of_joint]
         self.joint_offsets_B: FloatArray = joints_B - supports_B[self.support_of_joint]
         self.plate0_M: FloatArray = np.array(geometry.plate_points_M_mm or np.full((3, 3), np.nan))
         self.joints_P: FloatArray = np.array([rod.platform_P_mm for rod in parts.rods])
