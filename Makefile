@@ -170,7 +170,7 @@ deb: $(STAMP) docs
 	$(BIN)/python -m build --sdist --outdir build/deb .
 	for release in $(RELEASES); do debian/build $$release build/deb/compd-*.tar.gz || exit 1; done
 
-SAMPLE := kinematics cycle diagnose
+SAMPLE := kinematics cycle diagnose worlds
 BENCH := $(SAMPLE) compare loop latency flood throughput page gateway long fleet kilohertz targets
 
 bench: $(STAMP)

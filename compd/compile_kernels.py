@@ -22,7 +22,8 @@ from compd.kernel_target import LEVELS
 def kernel_modules() -> list[str]:
     """The names of all modules with kernels or helpers."""
     root = Path(__file__).parent.parent
-    names = [".".join(file.relative_to(root).with_suffix("").parts) for file in jit.kernel_sources()]
+    sources = [*jit.kernel_sources(), *jit.truth_kernel_sources()]
+    names = [".".join(file.relative_to(root).with_suffix("").parts) for file in sources]
     return [name.removesuffix(".__init__") for name in names]
 
 

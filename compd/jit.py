@@ -6,7 +6,7 @@ import fcntl
 import hashlib
 import os
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, nullcontext
 from functools import cache, wraps
 from importlib import import_module
@@ -64,8 +64,17 @@ def kernel_sources() -> list[Path]:
     here = Path(__file__).parent
     files = [here.glob("*.py"), (here / "model").rglob("*.py")]
     files += [(here / "live" / package).glob("*.py") for package in ("machine", "memory")]
+    return _with_kernels(chain.from_iterable(files))
+
+
+def truth_kernel_sources() -> list[Path]:
+    """The sources of the simulated machine's kernels, on which no setpoint depends."""
+    return _with_kernels((Path(__file__).parent / "simulation" / "truth").glob("*.py"))
+
+
+def _with_kernels(files: Iterable[Path]) -> list[Path]:
     marks = (b"@helper", b"kernel(", b"@loop", b"structure(", b"_LIMIT = ")
-    return [file for file in sorted(chain.from_iterable(files)) if any(mark in file.read_bytes() for mark in marks)]
+    return [file for file in sorted(files) if any(mark in file.read_bytes() for mark in marks)]
 
 
 @cache

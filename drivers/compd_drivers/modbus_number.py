@@ -40,12 +40,12 @@ class RegisterNumber(DescriptionSection):
     shift: int = Field(default=0, ge=0, le=63, description="bits by which what the mask leaves is moved down")
     minus: Mask | None = Field(default=None, description="the bit that is 1 for a negative number beside its size")
 
-    @property
+    @cached_property
     def bytes(self) -> int:
         """Length of the number in bytes, without those before it; 0 for a bit."""
         return int(re.sub(r"\D", "", self.type) or 0) // 8
 
-    @property
+    @cached_property
     def length(self) -> int:
         """Registers, or bits by function 1 and 2, that are read for the number."""
         return 1 if self.type == "bit" else -(-(self.at_byte + self.bytes) // 2)

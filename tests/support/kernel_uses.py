@@ -20,6 +20,7 @@ from compd.model.kinematics import (
     track_motion,
 )
 from compd.rotation import compose, rotation_matrix, rotation_vector
+from compd.simulation import World
 from tests.support.effect_rows import HEXAPOD, LIBRARY, TRIPOD, constants_of, observe_rows, random_inputs
 from tests.support.formulas import written
 from tests.support.live_machine import RAW_AT_ZERO_MM, machine
@@ -31,7 +32,8 @@ FILES = ROOT / "tests" / "guard" / "files-0.2"
 
 
 def use_all_kernels() -> None:
-    """Rotations, poses, effects and formulas of rows, a comparison, cycles of both machines at rest and in motion."""
+    """Rotations, poses, effects and formulas of rows, a comparison, cycles of both machines at rest and in motion,
+    and the simulated machine."""
     random = np.random.default_rng(1)
     R = rotation_matrix(random.normal(size=(1000, 3)))
     rotation_vector(compose(R, R[::-1]))
@@ -47,6 +49,8 @@ def use_all_kernels() -> None:
     for name in ("tripod-cmm", "hexapod"):
         list(replay_cycles(load(FILES / f"{name}.yaml"), RecordedCycles(FILES / f"{name}-run")))
         _in_motion(with_noise(machine(f"{name}.yaml"), 0.1))
+        configuration = load(CONFIG / f"{name}.yaml")
+        World(configuration.geometry, configuration.wiring, seed=1).advance(1.0)
 
 
 def _pose(model: MachineModel, random: np.random.Generator) -> None:

@@ -25,6 +25,7 @@ class MotionBefore:
         self.history: deque[GaugeSample] = deque(maxlen=KEPT)  #: in the order of time; empty before the first
         self._tolerance_mm = tolerance_mm
         self._limits = limits
+        self._speed_at: tuple[GaugeSample | None, tuple[Interval, float]] = None, (ANY_SPEED, 0.0)
 
     @property
     def last(self) -> GaugeSample:
@@ -68,7 +69,8 @@ class MotionBefore:
     def _base(self) -> int | None:
         """Index of the sample from which the speed until the last one is measured."""
         history = self.history
-        latest_s = history[-1].time_s - max(BASE_S, 4 * history[-1].window_s)
+        _, last_s, window_s = history[-1]
+        latest_s = last_s - max(BASE_S, 4 * window_s)
         for k in range(len(history) - 2, -1, -1):
             if history[k].time_s <= latest_s:
                 return k
@@ -76,6 +78,11 @@ class MotionBefore:
 
     def speed(self) -> tuple[Interval, float]:
         """Mean speed (mm/s) until the last sample, and over how long (s); without bounds where it is not known."""
+        if self._speed_at[0] is not self.history[-1]:  # one reading is judged by it several times
+            self._speed_at = self.history[-1], self._speed()
+        return self._speed_at[1]
+
+    def _speed(self) -> tuple[Interval, float]:
         base = self._base()
         if base is None:
             first_s = self.history[-1].time_s - self.history[0].time_s

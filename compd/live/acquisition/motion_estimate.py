@@ -53,6 +53,8 @@ _DECIMALS_MM, _DECIMALS_S = 9, 6
 # Every fourth reading is kept to detect a rest. They cover 128 readings: some 2 s of a scale, 6 s of a slow line.
 _KEPT_EVERY, _KEPT = 4, 32
 UNKNOWN = ReadingMotion(0.0, 0.0, math.nan, 0.0)
+# How many fields of a motion, from the first, the speeds give.
+_SPEEDS = ReadingMotion._fields.index("scatter_mm")
 
 
 def estimated_motion(history: Sequence[GaugeSample], tolerance_mm: float) -> ReadingMotion:
@@ -60,16 +62,15 @@ def estimated_motion(history: Sequence[GaugeSample], tolerance_mm: float) -> Rea
 
     tolerance_mm : by which two readings of the same value may differ, mm.
     """
+    history = list(history)  # of a deque, which is slower to index
     last = len(history) - 1
     start = _window_start(history, last, tolerance_mm) if last > 0 else last
     duration_s = history[last].time_s - history[start].time_s
     if duration_s <= 0.0:
         return UNKNOWN
-    rounds = [history[k].time_s - history[k - 1].time_s for k in range(max(1, last - 1), last + 1)]
-    horizon_s = min(HORIZON_ROUNDS * max(rounds), MAX_HORIZON_S)
-    due_s = ROUNDS_UNTIL_DUE * median(
-        history[k].time_s - history[k - 1].time_s for k in range(max(1, last - _USUAL_ROUNDS + 1), last + 1)
-    )
+    rounds = [later.time_s - earlier.time_s for earlier, later in pairwise(history[-_USUAL_ROUNDS - 1 :])]
+    horizon_s = min(HORIZON_ROUNDS * max(rounds[-2:]), MAX_HORIZON_S)
+    due_s = ROUNDS_UNTIL_DUE * median(rounds)
     recent = _recent_speed(history, tolerance_mm)
     if _stands(history, start, recent, tolerance_mm):
         start = last - _CALM_ROUNDS
@@ -101,13 +102,14 @@ def estimated_motion(history: Sequence[GaugeSample], tolerance_mm: float) -> Rea
 
 def _window_start(history: Sequence[GaugeSample], last: int, tolerance_mm: float) -> int:
     """Start of the shortest window in which the length has changed, or of the longest window."""
-    newest = history[last]
+    newest_mm, newest_s, _ = history[last]
     start = last - 1
     for k in range(last - 1, -1, -1):
-        if newest.time_s - history[k].time_s > MAX_WINDOW_S and k < last - 1:
+        value_mm, time_s, _ = history[k]
+        if newest_s - time_s > MAX_WINDOW_S and k < last - 1:
             break
         start = k
-        if abs(newest.value - history[k].value) > tolerance_mm:
+        if abs(newest_mm - value_mm) > tolerance_mm:
             break
     return start
 
@@ -147,25 +149,32 @@ def _slopes(history: Sequence[GaugeSample], start: int, duration_s: float) -> li
 
     Windows that ended more than MAX_WINDOW_S ago do not count.
     """
-    newest, begin = history[-1], history[start]
-    slopes = [(newest.value - begin.value) / duration_s]
-    end = begin
+    end_mm, end_s, _ = history[start]
+    newest_mm, newest_s, _ = history[-1]
+    slopes = [(newest_mm - end_mm) / duration_s]
     for k in range(start - 1, -1, -1):
-        if newest.time_s - end.time_s > MAX_WINDOW_S:
+        if newest_s - end_s > MAX_WINDOW_S:
             break
-        passed_s = end.time_s - history[k].time_s
+        value_mm, time_s, _ = history[k]
+        passed_s = end_s - time_s
         if passed_s >= _AS_LONG * duration_s:
-            slopes.append((end.value - history[k].value) / passed_s)
-            end = history[k]
+            slopes.append((end_mm - value_mm) / passed_s)
+            end_mm, end_s = value_mm, time_s
     return slopes
 
 
 def _rounded(
     speed: float, braking: float, u: float, horizon_s: float, mean: float, window_s: float, due_s: float
 ) -> ReadingMotion:
-    speed, braking, u, mean = (round(value, _DECIMALS_MM) for value in (speed, braking, u, mean))
-    horizon_s, window_s, due_s = (round(value, _DECIMALS_S) for value in (horizon_s, window_s, due_s))
-    return ReadingMotion(speed, braking, u, horizon_s, mean, window_s, due_s)
+    return ReadingMotion(
+        round(speed, _DECIMALS_MM),
+        round(braking, _DECIMALS_MM),
+        round(u, _DECIMALS_MM),
+        round(horizon_s, _DECIMALS_S),
+        round(mean, _DECIMALS_MM),
+        round(window_s, _DECIMALS_S),
+        round(due_s, _DECIMALS_S),
+    )
 
 
 class MotionEstimate:
@@ -177,11 +186,16 @@ class MotionEstimate:
         self._kept: deque[GaugeSample] = deque(maxlen=_KEPT)
         self._count = 0
 
-    def note(self, history: Sequence[GaugeSample]) -> ReadingMotion:
-        """The motion at the last of these readings, of which the others have been noted before."""
+    def note(self, history: Sequence[GaugeSample], scatter_mm: float = math.nan) -> ReadingMotion:
+        """The motion at the last of these readings, of which the others have been noted before.
+
+        scatter_mm : of the length at rest.
+        """
         sample = history[-1]
-        motion = estimated_motion(history, self._tolerance_mm)
-        return motion._replace(rest_s=self._rest_s(sample), late_s=round(sample.window_s, _DECIMALS_S))
+        speeds = estimated_motion(history, self._tolerance_mm)[:_SPEEDS]
+        # in the order of the fields: `_replace` takes three times as long
+        late_s = round(sample.window_s, _DECIMALS_S)
+        return ReadingMotion._make((*speeds, scatter_mm, self._rest_s(sample), late_s))
 
     def _rest_s(self, sample: GaugeSample) -> float:
         """Since when readings have been near this one, s. Slow drifts are no motion."""

@@ -194,10 +194,10 @@ class ReadingTrust:
         self._latest.note(sample.value, self._unexplained_mm(sample))
         self._remember(sample)
         self._memory.believe(self._i, sample.value, sample.time_s)
-        motion = self._motion.note(self._before.history)
+        motion = self._motion.note(self._before.history, self._scatter_mm())
         if self._memory.suspected[self._i]:
             return bad(reading.time_s, Quality.STALE, "stands while all others move")
-        return reading._replace(motion=motion._replace(scatter_mm=self._scatter_mm()))
+        return Reading(reading.value, reading.time_s, reading.quality, reading.detail, motion)
 
     def _scatter_mm(self) -> float:
         """The larger scatter of windows of readings and of the last few; nan if neither shows one."""

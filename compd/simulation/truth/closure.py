@@ -15,23 +15,22 @@ from numpy.typing import NDArray
 
 from compd.arrays import FloatArray
 from compd.errors import KinematicsError
+from compd.simulation.truth.closure_kernels import (
+    CLOSED_MM,
+    LOST_MM,
+    MAX_ITERATIONS,
+    PLATFORM_RADIUS_MM,
+    close,
+    find_forces,
+)
 
 # (4, 3): the platform's origin in {M}, mm, and its x, y, z axes in {M}.
 Posture = NDArray[np.float64]
 
-# Tolerance: far below every physical cause (nm), far above rounding at 1 m (1e-13 mm).
-CLOSED_MM = 1e-11
-MAX_ITERATIONS = 25
-# Newton's method has diverged.
-LOST_MM = 1e5
-# Weights errors of the axes: as the millimetres that they displace at this radius.
-PLATFORM_RADIUS_MM = 100.0
 _UNIT = np.eye(3)
 # Pairs of axes whose products rigidity fixes: the upper triangle of (3, 3), by row, column and place when flat.
 _FIRST, _SECOND = np.triu_indices(3)
 _UPPER = 3 * _FIRST + _SECOND
-# Parts of equations, and a function for their gradients, each with 12 columns, in the same order.
-Equations = tuple[list[FloatArray], Callable[[], list[FloatArray]]]
 
 
 def _rigidity_entries() -> NDArray[np.intp]:
@@ -45,6 +44,7 @@ def _rigidity_entries() -> NDArray[np.intp]:
 
 _ENTRIES = _rigidity_entries()
 _NOTHING = np.zeros(1)
+_NO_TIP = np.empty(0)
 
 
 def homogeneous(points_P: FloatArray) -> FloatArray:
@@ -111,27 +111,32 @@ class Closure:
         base_M, joints_P : (n, 3) joint centres, mm. lengths_mm : (n,). Newton's method from `guess`; raises
         KinematicsError where the links cannot meet.
         """
-        joints = _Joints(self, joints_P)
-
-        def equations(posture: Posture) -> Equations:
-            lengths, across, gradients = joints.at(posture, base_M)
-            return [lengths - lengths_mm, across], gradients
-
-        return _newton(equations, guess, "lengths", lengths_mm)
+        return self._closed(base_M, joints_P, _NO_TIP, lengths_mm, guess, "lengths")
 
     def by_tip(
         self, base_M: FloatArray, joints_P: FloatArray, tip_P: FloatArray, tip_M: FloatArray, guess: Posture
     ) -> Posture:
         """Tripod only: the posture in which the place `tip_P` of the platform is at `tip_M`, (3,) mm each."""
-        joints = _Joints(self, joints_P)
-        tip_row = homogeneous(tip_P)
-        gradient = np.einsum("k,cd->ckd", tip_row, _UNIT).reshape(3, 12)
+        return self._closed(base_M, joints_P, homogeneous(tip_P), tip_M, guess, "tip")
 
-        def equations(posture: Posture) -> Equations:
-            _, across, gradients = joints.at(posture, base_M)
-            return [tip_row @ posture - tip_M, across], lambda: [gradient, gradients()[1]]
+    def _closed(
+        self,
+        base_M: FloatArray,
+        joints_P: FloatArray,
+        tip_row: FloatArray,
+        wanted_mm: FloatArray,
+        guess: Posture,
+        what: str,
+    ) -> Posture:
+        posture = np.array(guess, order="C")
+        base_M, wanted_mm = np.ascontiguousarray(base_M), np.ascontiguousarray(wanted_mm)
+        if not close(*self._parts(joints_P), base_M, tip_row, wanted_mm, posture):
+            raise _out_of_reach(what, wanted_mm)
+        return posture
 
-        return _newton(equations, guess, "tip", tip_M)
+    def _parts(self, joints_P: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, NDArray[np.intp]]:
+        """The first arguments of the kernels."""
+        return homogeneous(joints_P), self.axes, self.fixed_M, self.link_of_axis
 
     def by_target(
         self,
@@ -180,14 +185,14 @@ class Closure:
         Returns axial (n,), N, tension positive, and (n, 3) the lateral force in {M}, N, that each link's
         base ball takes from the link (tripod: along its revolute axis; hexapod: none).
         """
-        _, _, gradients = _Joints(self, joints_P).at(posture, base_M)
-        generalised = sum((np.outer(homogeneous(at_P), force_M) for force_M, at_P in loads), np.zeros((4, 3)))
-        multipliers = np.linalg.solve(np.concatenate([*gradients(), _rigidity(posture)]).T, generalised.ravel())
-        n = len(base_M)
-        lateral = multipliers[n : n + len(self.axes)]
-        lateral_M = np.zeros((n, 3))
-        np.add.at(lateral_M, self.link_of_axis, lateral[:, None] * (self.axes @ posture + self.fixed_M))
-        return multipliers[:n], lateral_M
+        load = np.zeros((4, 3))
+        for force_M, at_P in loads:
+            load += homogeneous(at_P)[:, None] * force_M
+        multipliers, lateral_M = load.ravel(), np.zeros(base_M.shape)
+        base_M, posture = np.ascontiguousarray(base_M), np.ascontiguousarray(posture)
+        if not find_forces(*self._parts(joints_P), base_M, posture, multipliers, lateral_M):
+            raise np.linalg.LinAlgError("Singular matrix")
+        return multipliers[: len(base_M)], lateral_M
 
 
 class _Joints:
@@ -235,27 +240,6 @@ def _is_right_handed(posture: Posture) -> bool:
 
 def _largest(residual: FloatArray) -> float:
     return float(np.maximum.reduce(np.abs(residual)))
-
-
-def _newton(equations: Callable[[Posture], Equations], guess: Posture, what: str, wanted: FloatArray) -> Posture:
-    """The posture at which `equations`, together with rigidity, vanish. `what`, `wanted`: for the error's text."""
-    posture = guess
-    for _ in range(MAX_ITERATIONS):
-        left, gradients = equations(posture)
-        residual = np.concatenate([*left, _departure(posture)])
-        largest_mm = _largest(residual)
-        if largest_mm > LOST_MM:
-            break
-        if largest_mm < CLOSED_MM:
-            if not _is_right_handed(posture):
-                break
-            return posture
-        try:
-            step = np.linalg.solve(np.concatenate([*gradients(), _rigidity(posture)]), residual)
-        except np.linalg.LinAlgError:
-            break
-        posture = posture - step.reshape(4, 3)
-    raise _out_of_reach(what, wanted)
 
 
 def _out_of_reach(what: str, wanted: FloatArray) -> KinematicsError:

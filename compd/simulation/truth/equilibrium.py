@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -45,6 +46,24 @@ class EquilibriumState:
     shown: FloatArray
 
 
+class _Warmed(NamedTuple):
+    """The parts at their present temperatures, without forces; mm.
+
+    of : the temperatures for which it is right, by identity. rods_mm : (n,) growth of the rods. unloaded_M : (3, 3)
+    supports. base_M : (n, 3) base joints with the actuators at machine zero. stretch, tool : relative.
+    """
+
+    of: FloatArray
+    stretch: float
+    tool: float
+    joints_P: FloatArray
+    rods_mm: FloatArray
+    unloaded_M: FloatArray
+    base_M: FloatArray
+    plate_M: FloatArray
+    closure: Closure
+
+
 class Equilibrium:
     """Solver for the state at given scale values, with the present temperatures, weather and causes."""
 
@@ -60,6 +79,7 @@ class Equilibrium:
     ) -> None:
         self._mechanism, self._strengths, self._frame, self._joints = mechanism, strengths, frame, joints
         self._causes, self._warm, self._weather = causes, warm, weather
+        self._warmed: _Warmed | None = None
         axes_P = mechanism.axes_P
         for cause in causes:
             axes_P = cause.tilted_axes_P(axes_P)
@@ -76,24 +96,17 @@ class Equilibrium:
 
         Raises KinematicsError if the links cannot meet.
         """
-        strengths, warm, machine, causes = self._strengths, self._warm, self._mechanism, self._causes
-        stretch = strengths.support_expansion_ppm_per_K * PPM * warm.since_zero_K("base")
-        platform = strengths.platform_expansion_ppm_per_K * PPM * warm.since_zero_K("platform")
-        joints_P = machine.joints_P * (1 + platform)
-        # rods between the balls and the scale (paper, figure 5) are part of the link
-        rods_mm = strengths.scale_rod_expansion_ppm_per_K * PPM * warm.links_K * machine.lengths0_mm
+        warm, machine, causes = self._warm, self._mechanism, self._causes
+        _, stretch, _, joints_P, rods_mm, unloaded_M, base_M, plate_M, closure = self._warmed_parts()
         lengths_mm = machine.lengths_at(scale_mm) + rods_mm
-
-        unloaded_M = self._frame.unloaded_M(warm)
-        base_M = machine.base_joints_M(unloaded_M, stretch, scale_mm)
-        closure = machine.turned_with_base(self._closure, unloaded_M)
+        if machine.moves_base:
+            base_M = machine.base_joints_M(unloaded_M, stretch, scale_mm)
         posture = closure.by_lengths(base_M, joints_P, lengths_mm, guess)
         total_N, total_lateral_M = self._forces(closure, posture, base_M, joints_P, force_M_N)
         axial_N, lateral_M = total_N - self._axial0_N, total_lateral_M - self._lateral0_M
 
-        pull_M = np.zeros((3, 3))
         directions_M = link_directions(base_M, homogeneous(joints_P) @ posture)
-        np.add.at(pull_M, machine.support_of_joint, axial_N[:, None] * directions_M + lateral_M)
+        pull_M = machine.carries @ (axial_N[:, None] * directions_M + lateral_M)
         supports_M = unloaded_M + self._frame.give_M(pull_M)
         balls = self._joints.balls(posture, directions_M, axial_N, lateral_M)
         inputs = CauseInputs(
@@ -130,7 +143,7 @@ class Equilibrium:
             link_mm,
             posture,
         )
-        if np.sum(posture[3] * machine.posture0[3]) < MIN_UPRIGHT:
+        if posture[3] @ machine.posture0[3] < MIN_UPRIGHT:
             raise KinematicsError.of(
                 "simulated machine",
                 "the platform would tip over at these scale values",
@@ -141,13 +154,34 @@ class Equilibrium:
         shown = (tip_M if machine.tip_frame == "M" else tip_P) + _sum(
             (cause.reference_shift(inputs) for cause in causes), 3
         )
-        plate_M = self._frame.plate_M(warm)
         return EquilibriumState(scale_mm, posture, supports_M, plate_M, balls, link_mm, axial_N, tip_M, tip_P, shown)
+
+    def _warmed_parts(self) -> _Warmed:
+        """The parts as they are now; computed once for each step of the temperatures."""
+        warm, machine, strengths = self._warm, self._mechanism, self._strengths
+        if self._warmed is not None and self._warmed.of is warm.bodies_degC:
+            return self._warmed
+        stretch = strengths.support_expansion_ppm_per_K * PPM * warm.since_zero_K("base")
+        platform = strengths.platform_expansion_ppm_per_K * PPM * warm.since_zero_K("platform")
+        unloaded_M = self._frame.unloaded_M(warm)
+        self._warmed = _Warmed(
+            warm.bodies_degC,
+            stretch,
+            1 + strengths.tool_expansion_ppm_per_K * PPM * warm.since_zero_K("tool"),
+            machine.joints_P * (1 + platform),
+            # rods between the balls and the scale (paper, figure 5) are part of the link
+            strengths.scale_rod_expansion_ppm_per_K * PPM * warm.links_K * machine.lengths0_mm,
+            unloaded_M,
+            machine.base_joints_M(unloaded_M, stretch),
+            self._frame.plate_M(warm),
+            machine.turned_with_base(self._closure, unloaded_M),
+        )
+        return self._warmed
 
     def _tip(self, posture: Posture, displaced: FloatArray | float = 0.0) -> tuple[FloatArray, FloatArray]:
         """The tip in {M} and in {P}, (3,) each; `displaced`: of the tip against what carries the tool."""
         machine = self._mechanism
-        tool = 1 + self._strengths.tool_expansion_ppm_per_K * PPM * self._warm.since_zero_K("tool")
+        tool = self._warmed_parts().tool
         if machine.tip_frame == "M":
             tip_P = machine.tip0_P * tool + displaced
             return homogeneous(tip_P) @ posture, tip_P

@@ -13,7 +13,8 @@ import numpy as np
 
 from compd.arrays import FloatArray
 from compd.operation_settings import Wiring
-from compd.simulation.truth.closure import CLOSED_MM, Posture, homogeneous
+from compd.simulation.truth.closure import Posture, homogeneous
+from compd.simulation.truth.closure_kernels import CLOSED_MM
 from compd.simulation.truth.frame import DISTANCE_ENDS, DISTANCES, distances_mm
 from compd.simulation.truth.mechanism import Mechanism
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from compd.arrays import FloatArray
 from compd.simulation.truth.closure import Posture, homogeneous
+from compd.simulation.truth.joint_kernels import add_waves, displace, find_angles
 from compd.simulation.truth.mechanism import Mechanism
 from compd.simulation.truth.strengths import Strengths
 
@@ -41,23 +42,28 @@ class Runout:
         self._phase_rad = rng.uniform(0, 2 * np.pi, shape)
         scatter = rng.uniform(0.5, 1.0, shape)  # from ball to ball
         self._amplitude_mm = scatter * amplitude_um[:, None, None] * UM * _HARMONIC_SHARES[:, None]
-        self._order = 1.0 + np.arange(len(_HARMONIC_SHARES))[:, None]
         self._at_zero = self._wave(np.zeros((joints, 2)))
 
     def displacement_mm(self, angles_rad: FloatArray) -> FloatArray:
         """(n, 3) mm for joint angles (n, 2)."""
         return self._wave(angles_rad) - self._at_zero
 
+    @property
+    def waves(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Amplitudes, mm, and phases, (n, 3, harmonics, 2) each, and the displacement (n, 3) at machine zero, mm."""
+        return self._amplitude_mm, self._phase_rad, self._at_zero
+
     def _wave(self, angles_rad: FloatArray) -> FloatArray:
-        turned = self._order * angles_rad[:, None, None, :] + self._phase_rad
-        return np.asarray((self._amplitude_mm * np.cos(turned)).sum(axis=(2, 3)))
+        wave_mm = np.zeros((len(angles_rad), 3))
+        add_waves(self._amplitude_mm, self._phase_rad, angles_rad, wave_mm)
+        return wave_mm
 
 
 class Joints:
     """All base and platform joints of a machine."""
 
     def __init__(self, mechanism: Mechanism, strengths: Strengths, rng: np.random.Generator) -> None:
-        self._strengths = strengths
+        self._give_mm_per_N = strengths.ball_give_along_um_per_N * UM, strengths.ball_give_across_um_per_N * UM
         self._n = mechanism.links
         directions_M = link_directions(mechanism.joints0_M, homogeneous(mechanism.joints_P) @ mechanism.posture0)
         axes_M = hinge_axes_M(mechanism)
@@ -71,19 +77,38 @@ class Joints:
 
     def balls(self, posture: Posture, directions_M: FloatArray, axial_N: FloatArray, lateral_M: FloatArray) -> Balls:
         """directions_M : (n, 3) as of `link_directions`. axial_N (n,), lateral_M (n, 3) : forces less those at zero."""
-        base = self._base.displacement_mm(angles(self._base_triads, directions_M))
-        platform_angles_rad = angles(self._platform_triads, directions_M @ posture[1:].T)
-        platform = self._platform.displacement_mm(platform_angles_rad)
-        along = self._strengths.ball_give_along_um_per_N * UM
-        across = self._strengths.ball_give_across_um_per_N * UM
+        directions_P = directions_M @ posture[1:].T
         # A link in tension pulls its base ball towards the platform, its platform ball towards the base.
-        return Balls(
-            base[:, 0] + along * axial_N,
-            _across(self._base_triads, base) + across * lateral_M,
-            platform[:, 0] - along * axial_N,
-            _across(self._platform_triads, platform) - across * lateral_M @ posture[1:].T,
-            self._shank.displacement_mm(platform_angles_rad)[:, 0],
+        base_along_mm, base_across_M = self._displaced(self._base, self._base_triads, directions_M, axial_N, lateral_M)
+        platform_along_mm, platform_across_P = self._displaced(
+            self._platform, self._platform_triads, directions_P, -axial_N, -lateral_M @ posture[1:].T
         )
+        shank_mm = self._shank.displacement_mm(angles(self._platform_triads, directions_P))[:, 0]
+        return Balls(base_along_mm, base_across_M, platform_along_mm, platform_across_P, shank_mm)
+
+    def _displaced(
+        self,
+        runout: Runout,
+        triads: FloatArray,
+        directions: FloatArray,
+        axial_N: FloatArray,
+        lateral_N: FloatArray,
+    ) -> tuple[FloatArray, FloatArray]:
+        """Displacements (n,) along the links and (n, 3) across, mm, of balls with these forces on them."""
+        along_mm, across_mm = np.empty(self._n), np.empty((self._n, 3))
+        along_mm_per_N, across_mm_per_N = self._give_mm_per_N
+        displace(
+            triads,
+            directions,
+            *runout.waves,
+            axial_N,
+            lateral_N,
+            along_mm_per_N,
+            across_mm_per_N,
+            along_mm,
+            across_mm,
+        )
+        return along_mm, across_mm
 
 
 def hinge_axes_M(mechanism: Mechanism) -> FloatArray | None:
@@ -97,7 +122,7 @@ def hinge_axes_M(mechanism: Mechanism) -> FloatArray | None:
 def link_directions(base_M: FloatArray, platform_M: FloatArray) -> FloatArray:
     """(n, 3) unit vectors from base to platform joints."""
     links_M = platform_M - base_M
-    return np.asarray(links_M / np.linalg.norm(links_M, axis=1, keepdims=True))
+    return np.asarray(links_M / np.sqrt((links_M * links_M).sum(axis=1, keepdims=True)))
 
 
 def triads(directions: FloatArray, axes: FloatArray | None) -> FloatArray:
@@ -111,9 +136,6 @@ def triads(directions: FloatArray, axes: FloatArray | None) -> FloatArray:
 
 def angles(axes: FloatArray, directions: FloatArray) -> FloatArray:
     """(n, 2) angles by which links have turned since machine zero; `axes` as from `triads`."""
-    along, first, second = np.einsum("nij,nj->in", axes, directions)
-    return np.stack([np.arctan2(first, along), np.arctan2(second, along)], axis=1)
-
-
-def _across(triads: FloatArray, displacement: FloatArray) -> FloatArray:
-    return np.asarray(displacement[:, 1:2] * triads[:, 1] + displacement[:, 2:3] * triads[:, 2])
+    turned_rad = np.empty((len(axes), 2))
+    find_angles(axes, directions, turned_rad)
+    return turned_rad

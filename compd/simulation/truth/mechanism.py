@@ -36,6 +36,8 @@ class Mechanism:
         supports_B = np.array(base.supports_B_mm) if base.supports_B_mm else _triangle_about(joints_B)
         self.supports0_M: FloatArray = origin_M + supports_B @ self.rotation_M_B0.T
         self.support_of_joint: NDArray[np.intp] = np.array(base.support_of_joint or [1] * self.links) - 1
+        # (3, n) 1 where a support has a joint
+        self.carries: FloatArray = np.eye(3)[:, self.support_of_joint]
         self.joint_offsets_B: FloatArray = joints_B - supports_B[self.support_of_joint]
         self.plate0_M: FloatArray = np.array(geometry.plate_points_M_mm or np.full((3, 3), np.nan))
         self.joints_P: FloatArray = np.array([rod.platform_P_mm for rod in parts.rods])
@@ -62,7 +64,7 @@ class Mechanism:
         )
         self._ways = [_Way(actuator) for actuator in parts.actuators]
         self.extended: NDArray[np.bool_] = np.array([self._ways[a].extends for a in self.scale_of_link])
-        self._all_extended = bool(self.extended.all())
+        self.moves_base = not self.extended.all()
         # links that extend one by one, with the platform's hinges on them in order: posture and lengths follow directly
         self.extends_alone = bool(
             self.extended.all()
@@ -158,7 +160,7 @@ class Mechanism:
         """
         axes = self._base_axes(supports_M)
         joints_M: FloatArray = supports_M[self.support_of_joint] + (1 + stretch) * self.joint_offsets_B @ axes
-        if scale_mm is None or self._all_extended:
+        if scale_mm is None or not self.moves_base:
             return joints_M
         moved_M: FloatArray = joints_M + self._displacements_B(self._zero_mm + scale_mm) @ axes
         return moved_M

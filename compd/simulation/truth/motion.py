@@ -94,13 +94,12 @@ class Approach:
         self._faster_s = np.maximum(peak - speed, 0.0) / acceleration
         self._even_s = self._faster_s + even_mm / drives.mm_per_s
         self._ends_s = self._even_s + peak / acceleration
-
-    @property
-    def duration_s(self) -> float:
-        return float(self._ends_s.max())
+        self.duration_s = float(self._ends_s.max())
 
     def position_mm(self, time_s: float) -> FloatArray:
         """(n,) scale positions `time_s` after the start; `end_mm` after the end."""
+        if time_s >= self.duration_s:
+            return self.end_mm
         half = 0.5 * self._drives.mm_per_s2 * self._sign
         faster_s, left_s = np.minimum(time_s, self._faster_s), np.maximum(self._ends_s - time_s, 0.0)
         before_mm = self._start_mm + self._start_mm_per_s * faster_s + half * faster_s**2

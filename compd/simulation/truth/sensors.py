@@ -76,4 +76,4 @@ class Sensors:
 
     def _measure(self, value: FloatArray, noise: float, step: float) -> FloatArray:
         noisy = value + noise * self._rng.standard_normal(len(value))
-        return np.asarray(np.round(noisy / step) * step) if step > 0 else noisy
+        return np.asarray(np.rint(noisy / step) * step) if step > 0 else noisy

@@ -117,6 +117,11 @@ class WarmUp:
         self._network.hold({body: degC for place, degC in places_degC.items() for body in self._places[place]})
 
     @property
+    def bodies_degC(self) -> Floats:
+        """(bodies,) temperatures; another array after each step."""
+        return self._network.temperature_degC
+
+    @property
     def room_degC(self) -> float:
         return self._weather.room_degC(self.time_s)
 

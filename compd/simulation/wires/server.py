@@ -65,8 +65,9 @@ class LiveWorld:
         """Reading of a gauge, in its unit. Raises CompdError for a name that is not in `names`."""
         if not name.startswith("scale_"):
             return self._world.sense(name)
-        with self.now() as world:
-            return world.sense_scale(name)
+        with self._lock:
+            self._world.move(self._passed_s())
+            return self._world.sense_scale(name)
 
     def _passed_s(self) -> float:
         """Seconds since the last access; called under the lock."""

@@ -12,7 +12,8 @@ from scipy.optimize import least_squares
 from compd.arrays import FloatArray
 from compd.configuration import Geometry
 from compd.errors import KinematicsError
-from compd.simulation.truth.closure import CLOSED_MM, homogeneous
+from compd.simulation.truth.closure import homogeneous
+from compd.simulation.truth.closure_kernels import CLOSED_MM
 from compd.simulation.truth.frame import distances_mm
 from compd.simulation.truth.mechanism import Mechanism
 from tests.support.paths import VECTORS

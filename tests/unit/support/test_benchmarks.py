@@ -16,8 +16,8 @@ from tests.benchmarks.bench_loop import configuration
 from tests.benchmarks.cost_table import ROOT
 from tests.benchmarks.limits import first_good, limit, printed_lines
 
-# Together they take 15 s of processor time; each of the others takes more, or compiles kernels.
-SHORT = ("exports", "flood", "gateway", "kilohertz", "kinematics", "latency")
+# Together they take 25 s of processor time; each of the others takes more, or compiles kernels.
+SHORT = ("exports", "flood", "gateway", "kilohertz", "kinematics", "latency", "worlds")
 EVERY = sorted(path.stem.removeprefix("bench_") for path in (ROOT / "tests" / "benchmarks").glob("bench_*.py"))
 NEEDS = {"kilohertz": "cyclictest", "kinematics": "gcc", "layouts": "cyclictest", "workbench": "chromium"}
 
