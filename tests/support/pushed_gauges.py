@@ -10,7 +10,8 @@ from compd.clock import MonotonicClock
 from compd.gauge import Gauge
 from compd.live.acquisition import Acquisition, ReadingTrust
 from compd.plugins import GAUGES, load
-from tests.support.wire_rig import PATIENCE_S, SETTINGS, WatchedLatest
+from tests.support.patience import PATIENCE_S
+from tests.support.wire_rig import SETTINGS, WatchedLatest
 
 STALE_AFTER_S = 0.5
 

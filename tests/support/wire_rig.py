@@ -19,9 +19,7 @@ from compd.lines.open import ANY_LINE
 from compd.live.memory import Latest
 from compd.plugins import GAUGES, SIMULATED_GAUGES, load
 from compd.simulation.wires.simulated_line import SimulatedLine
-
-# A bound for waiting, never a measure: a test that needs it has failed.
-PATIENCE_S = 20.0
+from tests.support.patience import PATIENCE_S
 
 Sense = Callable[[str], float]
 SETTINGS: TypeAdapter[LineSettings] = TypeAdapter(ANY_LINE)

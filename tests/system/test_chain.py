@@ -15,11 +15,10 @@ from compd.client import Client, connect
 from compd.demo.machine_zero import wait_for_gauges
 from compd.demo.processes import Command, run_commands
 from compd.simulation import ControlClient
+from tests.support.patience import PATIENCE_S
 from tests.support.simulated import TRIPOD, made_patient
 
 RATE_HZ = 50.0
-# Long enough for a loaded machine; what is waited for comes much sooner.
-PATIENCE_S = 30.0
 
 Setpoint = dict[str, Any]
 

@@ -8,7 +8,7 @@ import pytest
 
 from tests.support.live_page import opened, until
 
-pytestmark = [pytest.mark.timeout(180), pytest.mark.long]
+pytestmark = pytest.mark.long
 
 PAINTED = """[...document.querySelectorAll('.spark')].filter((canvas) =>
   canvas.width && canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height).data.some((v) => v)).length"""

@@ -14,9 +14,10 @@ import pytest
 from compd.page.broadcast import LIVE_HZ
 from tests.support.event_stream import EventStream, cookie_of, host_of, request
 from tests.support.live_page import memory_mb, page_process
+from tests.support.patience import PATIENCE_S
 from tests.support.scripted_page import LOOKS, ORDERS
 
-pytestmark = [pytest.mark.timeout(180), pytest.mark.long, pytest.mark.sample]
+pytestmark = [pytest.mark.long, pytest.mark.sample]
 
 BROWSERS = 10
 # What the system, the server and the client may keep for a client that does not read.
@@ -64,7 +65,7 @@ def test_a_client_that_stops_reading_grows_nothing_and_its_old_events_are_not_sh
         for reader in readers:
             reader.start()
         for reader in readers:
-            reader.join(120.0)
+            reader.join(PATIENCE_S)
             assert not reader.is_alive()
         assert memory_mb(live.pid) - before_mb < GROWTH_MB
         for reader in readers:
@@ -258,7 +259,7 @@ def test_whatever_an_armed_browser_names_is_refused_in_plain_words(live, cookie,
 
 def test_another_address_without_tokens_does_not_start():
     words = [sys.executable, "-m", "compd", "page", "--daemon", "/no/socket", "--listen", "0.0.0.0", "--port", "0"]
-    ended = subprocess.run(words, capture_output=True, text=True, timeout=60, check=False)
+    ended = subprocess.run(words, capture_output=True, text=True, timeout=PATIENCE_S, check=False)
     assert ended.returncode == 2
     message = " ".join(ended.stderr.split())
     assert "--tokens" in message
@@ -273,7 +274,7 @@ def test_people_on_other_computers_have_the_roles_of_their_tokens_and_read_only_
 ):
     tokens = tmp_path / "tokens.yaml"
     words = [sys.executable, "-m", "compd", "page", "--tokens", str(tokens), "--new-token", f"{ORDERS}:Anna"]
-    token = subprocess.run(words, capture_output=True, text=True, timeout=60, check=True).stdout.strip()
+    token = subprocess.run(words, capture_output=True, text=True, timeout=PATIENCE_S, check=True).stdout.strip()
     listen = ("--listen", host, "--tokens", str(tokens), *options)
     with (
         page_process(Path("/no/socket"), tmp_path / "recordings", *listen) as (address, _),

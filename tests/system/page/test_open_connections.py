@@ -18,7 +18,7 @@ from compd.page.limited_protocol import HEAD_WITHIN_S, MAX_HEAD_BYTES, UNKNOWN_W
 from tests.support.event_stream import EventStream, connected, cookie_of, host_of, request
 from tests.support.live_page import memory_mb, page_process
 
-pytestmark = [pytest.mark.timeout(180), pytest.mark.long, pytest.mark.sample]
+pytestmark = [pytest.mark.long, pytest.mark.sample]
 
 MANY = 1100
 UNKNOWN = ConnectionLimits().unknown

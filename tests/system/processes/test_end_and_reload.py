@@ -14,9 +14,10 @@ from compd.client import Client, connect
 from compd.errors import DaemonError
 from compd.setpoint_states import State
 from tests.support.daemon_process import Daemon, Pidfds
+from tests.support.patience import PATIENCE_S
 from tests.support.process_checks import check_undisturbed, cycles_kept, is_ok
 from tests.support.processes import RATE_HZ
-from tests.support.watching import PATIENCE_S, Seen, until
+from tests.support.watching import Seen, until
 
 # Promised are 2 s from SIGTERM to the end.
 END_S = 3.0

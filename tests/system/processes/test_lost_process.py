@@ -11,9 +11,10 @@ import pytest
 
 from compd.setpoint_states import State
 from tests.support.daemon_process import Daemon, Pidfds
+from tests.support.patience import PATIENCE_S
 from tests.support.process_checks import is_ok, is_valid, started_again, starts
 from tests.support.sampled import sampled
-from tests.support.watching import PATIENCE_S, Seen, until
+from tests.support.watching import Seen, until
 
 # Promised are 20 ms, or two periods where that is longer, until clients hear of a lost loop.
 SILENCE_S = 0.15

@@ -16,9 +16,9 @@ from compd.client import Client, connect
 from compd.errors import DaemonError
 from tests.support.external_machines import GANTRY, Served, class_geometry, served
 from tests.support.live_models import SPINDLE_GROWTH, file_with
+from tests.support.patience import PATIENCE_S
 from tests.support.running_daemon import supervised
 
-PATIENCE_S = 30
 CYCLES = 1000
 # The gantry is less square than the class says, by so much more of x along y.
 SQUARE = {

@@ -17,7 +17,8 @@ from compd.gauge import LineFault, Quality
 from compd.lines import open_line
 from compd.pushed_gauge import Message
 from tests.support.mosquitto import Broker, hashed, needs_mosquitto, publisher, running_broker
-from tests.support.wire_rig import PATIENCE_S, SETTINGS
+from tests.support.patience import PATIENCE_S
+from tests.support.wire_rig import SETTINGS
 
 OK = Quality.OK
 pytestmark = needs_mosquitto

@@ -16,8 +16,9 @@ from compd.clock import MonotonicClock
 from compd.gauge import Quality
 from compd.live.acquisition.acquisition import Acquisition
 from compd.live.acquisition.shared_endpoints import Peers
+from tests.support.patience import PATIENCE_S
 from tests.support.sampled import sampled
-from tests.support.wire_rig import PATIENCE_S, SETTINGS, Rig, WatchedLatest, rig
+from tests.support.wire_rig import SETTINGS, Rig, WatchedLatest, rig
 from tests.unit.drivers.test_simulated import CASES, Case
 
 OK = Quality.OK

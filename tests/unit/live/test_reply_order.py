@@ -20,8 +20,9 @@ from compd.conformance.virtual import TURNAROUND_S, VirtualClock, VirtualWire
 from compd.gauge import Gauge, Quality, Reading, replies_tell_whose
 from compd.live.acquisition.acquisition import LineThread
 from compd.plugins import GAUGES, load
+from tests.support.patience import PATIENCE_S
 from tests.support.sampled import sampled
-from tests.support.wire_rig import PATIENCE_S, SETTINGS, WatchedLatest
+from tests.support.wire_rig import SETTINGS, WatchedLatest
 
 UNITS = 9
 ANSWER_S = 60e-3

@@ -21,7 +21,8 @@ from compd.live.acquisition.possible_motion import MotionLimits
 from compd.live.acquisition.reading_trust import ReadingTrust, TrustSettings
 from compd.live.acquisition.round_trigger import read_latched
 from compd.live.memory.trust_memory import TrustMemory
-from tests.support.wire_rig import PATIENCE_S, SETTINGS, InstantClock, Rig, ScriptedPort, WatchedLatest, rig
+from tests.support.patience import PATIENCE_S
+from tests.support.wire_rig import SETTINGS, InstantClock, Rig, ScriptedPort, WatchedLatest, rig
 
 OK = Quality.OK
 UNITS = range(1, 10)

@@ -25,6 +25,7 @@ from compd.live.service.loop_watch import LoopWatch
 from compd.live.system.child_process import OUT_OF_MEMORY, ChildProcess
 from compd.live.system.realtime import RationedPriority, thread_time_s
 from compd.setpoint_states import Mode, State
+from tests.support.patience import PATIENCE_S
 
 
 @pytest.fixture
@@ -251,7 +252,7 @@ def test_the_processor_time_of_a_thread_is_its_own_until_it_has_ended():
 
     thread = threading.Thread(target=line)
     thread.start()
-    assert started.wait(20.0)
+    assert started.wait(PATIENCE_S)
     assert 0.0 < thread_time_s(thread.native_id) < time.process_time()
     assert thread_time_s(threading.get_native_id()) == pytest.approx(time.thread_time(), abs=0.1)
     end.set()
