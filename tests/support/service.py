@@ -9,7 +9,6 @@ import threading
 
 import numpy as np
 
-from compd.clock import MonotonicClock
 from compd.compensation import Compensation
 from compd.compensation.values import Contributions
 from compd.errors import StateError
@@ -20,6 +19,7 @@ from compd.live.service.messages import line
 from compd.model.kinematics import Frame
 from compd.operation_settings import SocketSettings
 from compd.setpoint_states import Mode, State
+from tests.support.hand_clock import SteppedClock
 from tests.support.patience import PATIENCE_S
 
 PERIOD_S = 0.005
@@ -70,19 +70,6 @@ class Peer:
     def close(self):
         self.file.close()
         self.socket.close()
-
-
-class SteppedClock:
-    """The real clock, which a test can put forward."""
-
-    def __init__(self):
-        self.ahead_s = 0.0
-
-    def monotonic(self):
-        return MonotonicClock().monotonic() + self.ahead_s
-
-    def step(self, step_s):
-        self.ahead_s += step_s
 
 
 class LoopIsWell:

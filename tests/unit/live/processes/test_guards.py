@@ -254,7 +254,8 @@ def test_the_processor_time_of_a_thread_is_its_own_until_it_has_ended():
     thread.start()
     assert started.wait(PATIENCE_S)
     assert 0.0 < thread_time_s(thread.native_id) < time.process_time()
-    assert thread_time_s(threading.get_native_id()) == pytest.approx(time.thread_time(), abs=0.1)
+    before_s = time.thread_time()
+    assert before_s <= thread_time_s(threading.get_native_id()) <= time.thread_time()
     end.set()
     thread.join()
     with pytest.raises(OSError, match="Invalid argument"):

@@ -21,8 +21,8 @@ from compd.live.service.client_session import ClientSession
 from compd.live.service.descriptor_bin import DescriptorBin
 from compd.live.service.messages import ProtocolError
 from compd.live.service.model_switch import ModelSwitch, ModelWish
+from tests.support.hand_clock import SteppedClock
 from tests.support.patience import PATIENCE_S
-from tests.support.service import SteppedClock
 
 TEXT = b"format: 1\n"
 
