@@ -15,7 +15,8 @@ from compd.gauge import LineFault, Quality
 from compd.lines import open_line
 from compd.lines.kinds.modbus_tcp.master import ModbusTcp
 from tests.support.serial_gateway import serial_gateway
-from tests.support.wire_rig import InstantClock, Rig, rig
+from tests.support.watching import until
+from tests.support.wire_rig import InstantClock, Rig, polled_until, rig
 
 LINE = {"kind": "modbus_tcp", "host": "x", "timeout_s": 0.1}
 GAUGE: dict[str, Any] = {
@@ -60,19 +61,20 @@ def test_the_pause_before_the_next_request(bench: Rig) -> None:
 
 
 def test_an_absent_unit_times_out(bench: Rig) -> None:
-    with bench.open() as line:
+    with bench.open(0.1) as line:
         assert quality_of(line, unit=8) is Quality.TIMEOUT
-        assert line.read_registers(7, 4, 0, 1).registers == (215,)
+        polled_until(bench.gauges["room"], line, lambda found: found == [(Quality.OK, pytest.approx(21.5))])
 
 
 @pytest.mark.parametrize("fault", ["silent", "garble", "late", "cut", "wrong unit", "noise before"])
 def test_a_broken_reply_is_a_fault_and_the_next_one_is_right(bench: Rig, fault: str) -> None:
-    with bench.open() as line:
+    with bench.open(0.1) as line:
         bench.wire.fault = fault
         assert quality_of(line) is Quality.TIMEOUT
         bench.wire.fault = None
+        until("no reply is under way", lambda: not bench.wire.replies_under_way)
         bench.values["a"] = -4.2
-        assert line.read_registers(7, 4, 0, 1).registers == (0x10000 - 42,)
+        polled_until(bench.gauges["room"], line, lambda found: found == [(Quality.OK, pytest.approx(-4.2))])
 
 
 def test_a_closed_connection_is_a_lost_line_and_a_new_object_helps(bench: Rig) -> None:

@@ -77,9 +77,10 @@ class Running:
         self.control.close()
         self.simulation.stop()
 
-    def read(self, gauge: str) -> dict[str, Reading]:
+    def read(self, gauge: str, timeout_s: float = PATIENCE_S) -> dict[str, Reading]:
         """By the product's own driver, over the port that the daemon's configuration names."""
-        line = open_line(self.daemon.lines[self.daemon.gauges[gauge].line], MonotonicClock())
+        settings = self.daemon.lines[self.daemon.gauges[gauge].line].model_copy(update={"timeout_s": timeout_s})
+        line = open_line(settings, MonotonicClock())
         try:
             driver = self.daemon.gauge_objects()[gauge]
             readings = driver.read(line)
@@ -225,7 +226,7 @@ def test_a_line_breaks_and_mends_on_request(start: Callable[[Path], Running]) ->
     running = start(TRIPOD)
     ask(running.control, {"class": "FAULT", "line": "joints", "fault": "silent"})
     with pytest.raises(LineFault) as silent:
-        running.read("joints")
+        running.read("joints", timeout_s=0.1)
     assert silent.value.quality is Quality.TIMEOUT
     assert all(reading.ok for reading in running.read("frame_u").values())
     ask(running.control, {"class": "FAULT", "line": "joints", "fault": None})
