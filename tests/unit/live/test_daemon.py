@@ -9,6 +9,7 @@ import socket
 import struct
 import subprocess
 import sys
+import time
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -76,11 +77,13 @@ def running(configured: Configuration, notifier=None):
 
 
 def first(setpoints, state):
-    """The first setpoint in `state`, of a bounded number."""
-    for _, setpoint in zip(range(2000), setpoints, strict=False):
+    """The first setpoint in `state`."""
+    end_s = time.monotonic() + PATIENCE_S
+    for setpoint in setpoints:
         if setpoint["state"] == state:
             return setpoint
-    raise AssertionError(f"never {state}, still {setpoint}")
+        assert time.monotonic() < end_s, f"never {state}, still {setpoint}"
+    raise AssertionError("no more setpoints come")
 
 
 @pytest.mark.usefixtures("still")
