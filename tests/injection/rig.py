@@ -30,7 +30,8 @@ from tests.injection.truth import PREFERRED, REST_EVERY_S, SETTLED_S, Truth
 from tests.support.daemon_process import Daemon
 from tests.support.live_models import file_with
 from tests.support.paths import CONFIG
-from tests.support.watching import PATIENCE_S, Rules, Seen, Watcher, until
+from tests.support.patience import PATIENCE_S
+from tests.support.watching import Rules, Seen, Watcher, until
 
 TRIPOD = "tripod-cmm.yaml"
 RATE_HZ = 100.0

@@ -19,7 +19,8 @@ from scipy.interpolate import PchipInterpolator
 
 from compd.errors import DaemonError
 from compd.simulation import ControlClient
-from tests.support.watching import PATIENCE_S, until
+from tests.support.patience import PATIENCE_S
+from tests.support.watching import until
 
 # For so long after a motion a setpoint may rest on readings from the motion: two polls of the slowest gauge.
 SETTLED_S = 0.3

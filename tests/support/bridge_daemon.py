@@ -7,8 +7,7 @@ import socket
 from pathlib import Path
 from typing import Any
 
-# Long enough for LinuxCNC to start.
-PATIENCE_S = 60.0
+from tests.support.patience import PATIENCE_S
 
 
 class BridgeDaemon:

@@ -20,7 +20,8 @@ import yaml
 from compd.client import Client, connect
 from compd.demo.processes import START_TIMEOUT_S, STOP_TIMEOUT_S
 from tests.support.misbehaving import DIAL_CHANNEL
-from tests.support.watching import PATIENCE_S, Message, Rules, Watcher
+from tests.support.patience import PATIENCE_S
+from tests.support.watching import Message, Rules, Watcher
 
 
 class Pidfds:

@@ -12,9 +12,8 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 from tests.support.paths import ROOT
+from tests.support.patience import PATIENCE_S
 from tests.support.watching import until
-
-PATIENCE_S = 60.0
 
 
 class DaskCluster:

@@ -10,8 +10,8 @@ from collections.abc import Iterator, Mapping
 from typing import Any, NamedTuple
 from urllib.parse import urlsplit
 
-# A server that hangs is found; a busy computer is none of its faults.
-ANSWER_WITHIN_S = 120.0
+from tests.support.patience import PATIENCE_S
+
 _PIECE_OCTETS = 4096
 
 
@@ -41,7 +41,7 @@ def connected(address: str, receive_buffer_octets: int = 0) -> socket.socket:
     name, _, port = host_of(address).rpartition(":")
     family = socket.AF_INET6 if name.startswith("[") else socket.AF_INET
     connection = socket.socket(family, socket.SOCK_STREAM)
-    connection.settimeout(ANSWER_WITHIN_S)
+    connection.settimeout(PATIENCE_S)
     if receive_buffer_octets:
         connection.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, receive_buffer_octets)
     connection.connect((name.strip("[]"), int(port)))

@@ -1,4 +1,4 @@
-"""A clock in the test's hands."""
+"""Clocks in the test's hands."""
 
 from __future__ import annotations
 
@@ -18,3 +18,17 @@ class HandClock(System):
 
     def wait(self, event: threading.Event, timeout_s: float) -> bool:
         raise AssertionError("nothing waits while time stands")
+
+
+class SteppedClock(System):
+    """The real clock, which a test can put forward."""
+
+    def __init__(self) -> None:
+        self.ahead_s = 0.0
+
+    def monotonic(self) -> float:
+        return super().monotonic() + self.ahead_s
+
+    def step(self, step_s: float) -> None:
+        """Let `step_s` pass."""
+        self.ahead_s += step_s

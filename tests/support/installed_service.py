@@ -16,6 +16,7 @@ from compd.client import Client, connect
 from compd.errors import DaemonError
 from tests.support.container import Container, wait_until
 from tests.support.paths import CONFIG
+from tests.support.patience import PATIENCE_S
 
 # Where the container has this project's configurations.
 CONFIGURATIONS = Path("/opt/config")
@@ -23,8 +24,6 @@ SIMULATED = Path("/run/simulated")
 MACHINE = Path("/etc/compd/machine.yaml")
 SOCKET = Path("/run/compd/compd.sock")
 SHIPPED = "tripod-cmm.yaml"
-# A bound for waiting, never a measure.
-PATIENCE_S = 60.0
 # Longer than the tests take: the machine stands still, so that machine zero fits its gauges throughout.
 ZERO_HOLD_S = 86_400
 

@@ -20,6 +20,7 @@ from compd.demo.machine_zero import take_zero
 from compd.demo.processes import Command, run_commands
 from compd.simulation import ControlClient
 from tests.support.paths import CONFIG
+from tests.support.patience import PATIENCE_S
 from tests.support.simulated import made_patient, run_directory
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or ""
@@ -33,8 +34,6 @@ FLAGS = [
 # The machine stands at machine zero until it is driven.
 AT_REST = ("--zero-hold", "600")
 _LOOK_EVERY_S = 0.05
-# A browser that runs behind everything else.
-_WITHIN_S = 60.0
 
 
 @dataclass
@@ -106,7 +105,7 @@ def page_process(unix_socket: Path, recordings: Path, *options: str) -> Iterator
         yield address, process.pid
     finally:
         process.send_signal(signal.SIGTERM)
-        process.communicate(timeout=10.0)
+        process.communicate(timeout=PATIENCE_S)
 
 
 def memory_mb(pid: int) -> float:
@@ -145,7 +144,7 @@ def opened(chromium: Any, page: LivePage, **options: Any) -> Iterator[Any]:
     tab.on("pageerror", lambda error: failures.append(str(error)))
     tab.on("console", lambda message: failures.append(message.text) if message.type == "error" else None)
     try:
-        tab.goto(page.address, timeout=1e3 * _WITHIN_S)
+        tab.goto(page.address, timeout=1e3 * PATIENCE_S)
         until(tab, "window.compd?.live?.setpoint && document.body.dataset.tone !== 'gone'")
         yield tab
         origin = page.address.partition("?")[0]
@@ -156,7 +155,7 @@ def opened(chromium: Any, page: LivePage, **options: Any) -> Iterator[Any]:
         context.close()
 
 
-def until(tab: Any, expression: str, within_s: float = _WITHIN_S) -> None:
+def until(tab: Any, expression: str, within_s: float = PATIENCE_S) -> None:
     """Wait until a JavaScript expression is true. (`wait_for_function` would need a page that allows `eval`.)
 
     An expression that fails is not true yet: after a click on a link the page may still be the one before, or be

@@ -6,8 +6,7 @@ import re
 from pathlib import Path
 from typing import Any, NamedTuple
 
-# Of a fit, a diagnosis or a page that starts, on a busy computer.
-PATIENCE_MS = 120_000
+from tests.support.patience import PATIENCE_S
 
 
 class Offered(NamedTuple):
@@ -22,7 +21,7 @@ class NaiveUser:
 
     def __init__(self, tab: Any) -> None:
         self.tab = tab
-        tab.set_default_timeout(PATIENCE_MS)
+        tab.set_default_timeout(1e3 * PATIENCE_S)
 
     def press(self, name: str) -> None:
         """Press the button whose words begin so."""

@@ -19,7 +19,7 @@ from asyncua.crypto.validator import CertificateValidator, CertificateValidatorO
 from asyncua.server.user_managers import UserManager
 
 from tests.support.certificates import Certificate
-from tests.support.wire_rig import PATIENCE_S
+from tests.support.patience import PATIENCE_S
 
 NAMESPACE = "http://compd.example/probes"
 NAMESPACE_INDEX = 2  # the first that a server gives

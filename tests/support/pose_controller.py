@@ -16,10 +16,10 @@ from scipy.spatial.transform import Rotation
 from compd.client import Client, connect
 from compd.configuration import load
 from compd.simulation import ControlClient, Mechanism
+from tests.support.patience import PATIENCE_S
 
 # Between two targets while it moves, as a slow controller does; a setpoint for a target is there a few cycles later.
 TARGET_EVERY_S = 0.02
-PATIENCE_S = 60.0
 # So often a pose at rest is corrected anew: limits let a correction grow step by step.
 PASSES = 3
 

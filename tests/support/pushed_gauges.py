@@ -8,11 +8,13 @@ from typing import Any
 
 from compd.gauge import Gauge
 from compd.live.acquisition import Acquisition, ReadingTrust
-from compd.live.system import THIS_COMPUTER
+from compd.live.system import THIS_COMPUTER, System
 from compd.plugins import GAUGES, load
-from tests.support.wire_rig import PATIENCE_S, SETTINGS, WatchedLatest
+from tests.support.patience import PATIENCE_S
+from tests.support.wire_rig import SETTINGS, WatchedLatest
 
-STALE_AFTER_S = 0.5
+# A value does not grow old on its way, however busy the computer is: a test puts the clock forward where it is to.
+STALE_AFTER_S = PATIENCE_S
 
 
 def gauge(driver: str, **options: Any) -> Gauge[Any]:
@@ -26,13 +28,15 @@ def acquiring(
     gauges: Mapping[str, Gauge[Any]],
     trust: Mapping[str, ReadingTrust] | None = None,
     stale_after_s: float = STALE_AFTER_S,
+    clock: System | None = None,
 ) -> Iterator[tuple[Acquisition, WatchedLatest]]:
-    """The line `l` with its thread, and its gauges' readings."""
+    """The line `l` with its thread, and its gauges' readings. clock : None for the real one."""
     channels: Sequence[str] = [f"{name}.{channel.name}" for name, each in gauges.items() for channel in each.channels]
     latest = WatchedLatest(channels)
     settings = SETTINGS.validate_python({"timeout_s": PATIENCE_S, "back_off_s": [0.05, 0.2], **line})
     lines = {"l": (settings, list(gauges.items()))}
-    acquisition = Acquisition(lines, dict.fromkeys(gauges, stale_after_s), latest, THIS_COMPUTER, trust=trust or {})
+    stale = dict.fromkeys(gauges, stale_after_s)
+    acquisition = Acquisition(lines, stale, latest, clock or THIS_COMPUTER, trust=trust or {})
     acquisition.start()
     try:
         yield acquisition, latest

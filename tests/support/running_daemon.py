@@ -12,8 +12,7 @@ from compd.configuration import Configuration
 from compd.live.daemon import Daemon
 from compd.live.supervisor import Supervisor
 from compd.live.system import THIS_COMPUTER, ChildProcess, Notifier
-
-START_WITHIN_S = 30
+from tests.support.patience import PATIENCE_S
 
 
 @contextmanager
@@ -29,7 +28,7 @@ def supervised(configuration: Configuration, notifier: Notifier | None = None) -
     process = ChildProcess("supervisor", lambda: supervisor.run(lambda: None, lambda: False), clock)
     process.start()
     try:
-        polling = clock.monotonic() + START_WITHIN_S
+        polling = clock.monotonic() + PATIENCE_S
         while not all(acquisition.beats for acquisition in daemon.acquisition):
             assert clock.monotonic() < polling, "the gauges are not polled"
             clock.wait(threading.Event(), 0.005)

@@ -13,7 +13,8 @@ from compd.live.acquisition.acquisition import LineThread
 from compd.live.memory import PollRequests
 from compd.live.service.message_keys.status import LineStatusKeys
 from compd.live.system import System
-from tests.support.wire_rig import PATIENCE_S, SETTINGS, InstantClock, WatchedLatest
+from tests.support.patience import PATIENCE_S
+from tests.support.wire_rig import SETTINGS, InstantClock, WatchedLatest
 
 STALE_AFTER_S = 0.5
 SETTINGS_TCP = SETTINGS.validate_python({"kind": "tcp", "host": "x", "port": 1, "timeout_s": 0.1})

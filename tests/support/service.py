@@ -16,13 +16,13 @@ from compd.live.loop import Commands, Setpoint
 from compd.live.memory import PollRequests, SharedRing
 from compd.live.service import Errands, Listeners, Messages, Publisher, RequestContext, Requests, TargetKeys, TcpAccess
 from compd.live.service.messages import line
-from compd.live.system import System
 from compd.model.kinematics import Frame
 from compd.operation_settings import SocketSettings
 from compd.setpoint_states import Mode, State
+from tests.support.hand_clock import SteppedClock
+from tests.support.patience import PATIENCE_S
 
 PERIOD_S = 0.005
-TIMEOUT_S = 20
 TARGET_KEYS = TargetKeys("tip_B0_mm", rotation=False)
 VERSION = {"class": "VERSION", "protocol": 1, "release": "1", "machine": "test", "config_hash": "00"}
 NO_ZERO = StateError.of("zero", "none")
@@ -44,7 +44,7 @@ class Peer:
         self.socket = socket.socket(family, socket.SOCK_STREAM)
         if receive_buffer:
             self.socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, receive_buffer)
-        self.socket.settimeout(TIMEOUT_S)
+        self.socket.settimeout(PATIENCE_S)
         self.socket.connect(address)
         self.file = self.socket.makefile("rb")
         try:
@@ -70,19 +70,6 @@ class Peer:
     def close(self):
         self.file.close()
         self.socket.close()
-
-
-class SteppedClock(System):
-    """The real clock, which a test can put forward."""
-
-    def __init__(self):
-        self.ahead_s = 0.0
-
-    def monotonic(self):
-        return super().monotonic() + self.ahead_s
-
-    def step(self, step_s):
-        self.ahead_s += step_s
 
 
 class LoopIsWell:

@@ -21,8 +21,7 @@ from compd.lines import RtuMaster
 from compd.lines.kinds.modbus_tcp.master import ModbusTcp
 from compd.plugins import GAUGES, SIMULATED_GAUGES, load
 from compd.twins import ModbusSlaves
-
-PATIENCE_S = 5.0
+from tests.support.patience import PATIENCE_S
 
 
 @dataclass

@@ -15,9 +15,8 @@ from compd.client import connect
 from compd.clock import MonotonicClock
 from compd.errors import DaemonError
 from compd.setpoint_states import State, state_named
+from tests.support.patience import PATIENCE_S
 
-# Long enough for a loaded computer; what is waited for comes much sooner.
-PATIENCE_S = 60.0
 LOOK_EVERY_S = 0.05
 # Numbers are rounded to 1e-7 mm.
 ROUNDING_MM = 1e-6

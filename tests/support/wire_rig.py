@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -20,9 +21,7 @@ from compd.live.memory import Latest
 from compd.live.system import System
 from compd.plugins import GAUGES, SIMULATED_GAUGES, load
 from compd.simulation.wires.simulated_line import SimulatedLine
-
-# A bound for waiting, never a measure: a test that needs it has failed.
-PATIENCE_S = 20.0
+from tests.support.patience import PATIENCE_S
 
 Sense = Callable[[str], float]
 SETTINGS: TypeAdapter[LineSettings] = TypeAdapter(ANY_LINE)
@@ -145,9 +144,12 @@ class Rig:
     values: dict[str, float]
 
     @contextmanager
-    def open(self) -> Iterator[Any]:
-        """The daemon's side of the line."""
-        line = open_line(self.settings, MonotonicClock())
+    def open(self, timeout_s: float = PATIENCE_S) -> Iterator[Any]:
+        """The daemon's side of the line; a reply is waited for as long as the computer takes.
+
+        timeout_s : that of `settings`, or another, where no reply comes.
+        """
+        line = open_line(self.settings.model_copy(update={"timeout_s": timeout_s}), MonotonicClock())
         try:
             yield line
         finally:
@@ -176,7 +178,18 @@ def rig(
         wire.stop()
 
 
-def outcome(gauge: Gauge[Any], line: Any) -> list[tuple[Quality, float]]:
+Outcome = list[tuple[Quality, Any]]
+
+
+def polled_until(gauge: Gauge[Any], line: Any, wanted: Callable[[Outcome], bool]) -> None:
+    """Poll until the outcome is `wanted`. A computer may be too busy for a reply's timeout: then there is no value."""
+    end_s = time.monotonic() + PATIENCE_S
+    while not wanted(found := outcome(gauge, line)):
+        assert all(quality is not Quality.OK for quality, _ in found), f"a wrong value: {found}"
+        assert time.monotonic() < end_s, f"still {found}"
+
+
+def outcome(gauge: Gauge[Any], line: Any) -> Outcome:
     """One poll: quality and value per channel; a fault of the whole poll counts for each. Drains as the daemon does."""
     try:
         return [(reading.quality, reading.value) for reading in gauge.read(line)]

@@ -26,7 +26,6 @@ from tests.support.simulated import run_directory
 
 # So many that `compd recording join` finds the clocks' offset.
 POSES, CHECKS = 32, 5
-TIMEOUT_S = 600
 # Standard deviation of each coordinate of a joint, as built.
 OFF_MM = 0.05
 # A share of the error as drawn. The tracker's noise is a hundredth of it.
@@ -73,7 +72,6 @@ def daemon(machine: Path, wires: Path, control: ControlClient) -> Iterator[Hidde
 
 
 @pytest.mark.long
-@pytest.mark.timeout(TIMEOUT_S)
 def test_the_daemon_with_the_machine_as_built_has_its_tip_where_it_is() -> None:
     with run_directory() as directory:
         drawing, workshop = written(directory)

@@ -116,7 +116,6 @@ def test_a_walk_does_what_it_shows_and_touches_what_it_says(walk: Walk, copy: Co
 
 @pytest.mark.long
 @pytest.mark.sample
-@pytest.mark.timeout(300)
 def test_all_walks_together_are_in_order_and_seen(copy: Copy) -> None:
     apply_all(copy, WALKS)
     for check in ("ruff check", "ruff format --check", "lint-imports"):

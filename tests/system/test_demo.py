@@ -14,7 +14,7 @@ SECONDS = 20.0
 # Tip error with joints and frame compensated, rms, um.
 RIGHT_UM = 0.5
 
-pytestmark = [pytest.mark.long, pytest.mark.sample, pytest.mark.timeout(400)]
+pytestmark = [pytest.mark.long, pytest.mark.sample]
 
 
 def late_demo(name: str, late_s: float) -> DemoSession:

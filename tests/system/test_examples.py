@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from tests.support.paths import ROOT
+from tests.support.patience import PATIENCE_S
 
 EXAMPLES = sorted((ROOT / "examples").glob("*.py"))
 LONGEST = 80
@@ -19,7 +20,7 @@ FALL = re.compile(r"(\w+(?: \w+)?): (?P<before>[\d.]+) um -> (?P<after>[\d.]+) u
 def run(name: str, *arguments: object) -> str:
     done = subprocess.run(
         [sys.executable, ROOT / "examples" / name, *map(str, arguments)],
-        cwd=ROOT, capture_output=True, text=True, check=False, timeout=110,
+        cwd=ROOT, capture_output=True, text=True, check=False, timeout=PATIENCE_S,
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
     return done.stdout
@@ -83,8 +84,13 @@ def test_an_arms_wrong_length_and_zero_are_found_among_eight(tmp_path: Path) -> 
 def test_without_an_argument_nothing_is_left_behind(tmp_path: Path) -> None:
     done = subprocess.run(
         [sys.executable, ROOT / "examples" / "external_machine.py"],
-        cwd=tmp_path, capture_output=True, text=True, check=True, timeout=110, env={"TMPDIR": str(tmp_path), **_path()},
-    )  # fmt: skip
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=True,
+        timeout=PATIENCE_S,
+        env={"TMPDIR": str(tmp_path), **_path()},
+    )
     assert "tuesday: " in done.stdout
     assert list(tmp_path.iterdir()) == []
 

@@ -17,13 +17,12 @@ from compd.errors import CompdError
 from compd.fleet import RecordingResult, examination, examine_fleet, find_recordings, read_table, write_table
 from compd.fleet.cluster import open_cluster
 from compd.fleet.engine import outcomes
-from tests.support.dask_cluster import PATIENCE_S, DaskCluster, dask_cluster
+from tests.support.dask_cluster import DaskCluster, dask_cluster
 from tests.support.measured import gauges, hidden, record
 from tests.support.paths import ROOT
+from tests.support.patience import PATIENCE_S
 
 # Processes are started anew, and each imports compd.
-pytestmark = pytest.mark.timeout(240)
-
 RECORDINGS = 8
 
 

@@ -19,12 +19,12 @@ import pytest
 
 from compd.clock import MonotonicClock
 from compd.live.service import connection_limits as seats
+from tests.support.patience import PATIENCE_S
 from tests.support.service import Service
 
 TOKEN = "hvNhV6l3Zk3lY0cJ4lV5Wg"
 # A network of its own for each process that runs these tests.
 HOST, CLIENT = (f"10.231.{os.getpid() % 256}.{number}" for number in (1, 2))
-TIMEOUT_S = 30
 
 CONTROLLER = """
 import socket, sys
@@ -70,9 +70,9 @@ def network() -> Iterator[str]:
 
 
 def until(happened: Callable[[], bool]) -> bool:
-    """Whether it has happened within TIMEOUT_S."""
+    """Whether it has happened within PATIENCE_S."""
     clock = MonotonicClock()
-    end_s = clock.monotonic() + TIMEOUT_S
+    end_s = clock.monotonic() + PATIENCE_S
     while not happened() and clock.monotonic() < end_s:
         clock.wait(threading.Event(), 0.05)
     return happened()

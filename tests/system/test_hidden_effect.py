@@ -67,7 +67,6 @@ NOT_LIVE = (
 NUMBERS = 300
 PLAIN_FLOORS = 2.5
 VISITS, CHECKS = 40, 10
-TIMEOUT_S = 600
 # A hidden effect is plain when the squared error is so many times what noise alone would give.
 PLAIN_RATIO = 2.0
 
@@ -165,14 +164,12 @@ def test_every_cause_is_run_or_left_out_for_a_reason() -> None:
     assert not [name for name in ONE if not CAUSES[name].in_library], "what the library has not stands in OUTSIDE"
 
 
-@pytest.mark.timeout(TIMEOUT_S)
 @pytest.mark.parametrize("cause", [*QUICK, *map(long, ONE)])
 def test_one_effect(cause: str) -> None:
     with run_directory() as directory:
         check_found(run_hidden([FIRST[cause]], directory))
 
 
-@pytest.mark.timeout(TIMEOUT_S)
 @pytest.mark.parametrize("cause", [*map(long, FALLS_SHORT)])
 def test_one_effect_whose_form_is_another(cause: str) -> None:
     with run_directory() as directory:
@@ -181,14 +178,12 @@ def test_one_effect_whose_form_is_another(cause: str) -> None:
     assert outcome.after_um < outcome.before_um / 3
 
 
-@pytest.mark.timeout(TIMEOUT_S)
 @pytest.mark.parametrize("causes", [*map(long, PAIRS)], ids="+".join)
 def test_two_effects(causes: tuple[str, str]) -> None:
     with run_directory() as directory:
         check_found(run_hidden([FIRST[cause] for cause in causes], directory))
 
 
-@pytest.mark.timeout(TIMEOUT_S)
 @pytest.mark.parametrize("cause", [*map(long, OUTSIDE)])
 def test_cause_that_the_library_has_not(cause: str) -> None:
     with run_directory() as directory:

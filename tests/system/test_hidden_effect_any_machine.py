@@ -25,7 +25,6 @@ from tests.support.pose_controller import pose_controller
 from tests.support.simulated import run_directory
 
 VISITS, CHECKS = 32, 8
-TIMEOUT_S = 600
 SPEEDUP = "200"
 
 
@@ -85,7 +84,6 @@ def visits(path: Path) -> tuple[list[Visit], list[Visit]]:
 
 
 @pytest.mark.long
-@pytest.mark.timeout(TIMEOUT_S)
 @pytest.mark.parametrize("name", [pytest.param("linear delta", marks=pytest.mark.sample), "3-PRS", "6-UPS"])
 def test_a_hidden_effect_is_found_and_the_live_error_falls(name: str) -> None:
     machine = MACHINES[name]

@@ -41,7 +41,6 @@ def split(campaign: Path, directory: Path) -> tuple[Path, Path]:
 
 
 @pytest.mark.long
-@pytest.mark.timeout(300)
 @pytest.mark.parametrize("by", ["order", "name"])
 @pytest.mark.parametrize("number", NUMBERS)
 def test_found_as_in_the_campaigns_own_recording(tmp_path: Path, number: int, by: str) -> None:

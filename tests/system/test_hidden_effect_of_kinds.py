@@ -21,7 +21,7 @@ from tests.support.hidden_run import hidden_run, parse_output
 from tests.support.hidden_visits import visits_to
 from tests.support.simulated import run_directory
 from tests.system.test_hidden_effect import FALLS_SHORT, LEFT_OUT, NOT_LIVE, PLAIN_FLOORS
-from tests.system.test_hidden_effect_any_machine import CHECKS, MACHINES, SPEEDUP, TIMEOUT_S, VISITS, Machine, written
+from tests.system.test_hidden_effect_any_machine import CHECKS, MACHINES, SPEEDUP, VISITS, Machine, written
 
 THERMOMETERS = ("link_1", "link_2", "link_3", "base", "platform", "tool", "room")
 # Each kind looks through its own numbers, so that the kinds do not all hide the same.
@@ -42,7 +42,6 @@ def plain_number(kind: str, configuration: Configuration) -> int:
 
 
 @pytest.mark.long
-@pytest.mark.timeout(TIMEOUT_S)
 @pytest.mark.parametrize("kind", OTHERS)
 def test_what_a_number_hides_is_found_and_the_live_error_falls(kind: str) -> None:
     with run_directory() as directory:

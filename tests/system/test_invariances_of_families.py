@@ -90,7 +90,6 @@ def original_of(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Ori
     return original
 
 
-@pytest.mark.timeout(600)
 @pytest.mark.parametrize(("name", "relation"), list(parameters()))
 def test_the_diagnosis_stays_the_same(
     name: str, relation: str, original_of: Callable[[str], Original], tmp_path: Path

@@ -39,7 +39,6 @@ def marked(name: str) -> ParameterSet:
 
 
 @pytest.mark.long
-@pytest.mark.timeout(300)
 @pytest.mark.parametrize("name", [marked(name) for name in WITH_MACHINE])
 def test_everything_on_a_page_with_a_machine_runs(name: str) -> None:
     run_page(name)
@@ -50,7 +49,6 @@ def test_the_longest_pages_are_there() -> None:
 
 
 @pytest.mark.long
-@pytest.mark.timeout(300)
 @pytest.mark.parametrize("name", [marked(name) for name in PAGES if name not in WITH_MACHINE])
 def test_everything_on_a_page_runs(name: str) -> None:
     run_page(name)

@@ -22,9 +22,10 @@ from compd.errors import CompdError
 from compd.recording import read_recording
 from compd.simulation import Mechanism, Simulation, World, read_plan
 from compd.simulation.truth.plan_motion import SETTLED_S
+from tests.support.patience import PATIENCE_S
 from tests.support.planned_measurements import plan_file, straight_down, thin
 from tests.support.simulated import TRIPOD, ask, run_directory
-from tests.unit.simulation.test_server import MAX_WAIT_S, TurnedClock
+from tests.unit.simulation.test_server import TurnedClock
 
 PAIR = ("link_elasticity", "joint_contact")
 
@@ -161,7 +162,7 @@ def test_the_machine_goes_through_its_plan_on_wires(tmp_path: Path) -> None:
         simulation = Simulation(configuration, world, directory, clock)
         simulation.start()
         try:
-            control.settimeout(MAX_WAIT_S)
+            control.settimeout(PATIENCE_S)
             control.connect(str(directory / "control.sock"))
             assert "plan" not in ask(control, {"class": "TRUTH"})
             clock.turn(5.1)

@@ -97,7 +97,6 @@ def check_outage(daemon: Daemon, watcher: Watcher, begin: Any, end: Any) -> None
 
 
 @needs_mosquitto
-@pytest.mark.timeout(120)
 def test_a_broker_that_dies_and_is_started_again() -> None:
     address = {"topic": "cell/scale_{}", "value": "/mm", "time": "/t"}
     with run_directory() as directory, running_broker(directory) as broker:
@@ -120,7 +119,6 @@ def keep_old_value(broker: Broker) -> None:
 
 
 @pytest.mark.long
-@pytest.mark.timeout(120)
 def test_a_server_that_stops_and_is_started_again() -> None:
     line = {"kind": "opc_ua", "endpoint": "opc.tcp://192.0.2.1:4840"}
     with run_directory() as directory:

@@ -20,7 +20,6 @@ from tests.support.container import COMPD, booted, install_compd, wait_until, wh
 from tests.support.installed_service import (
     CONFIGURATIONS,
     MACHINE,
-    PATIENCE_S,
     SOCKET,
     Service,
     changed_limit,
@@ -29,6 +28,7 @@ from tests.support.installed_service import (
     without_s,
 )
 from tests.support.paths import CONFIG, ROOT
+from tests.support.patience import PATIENCE_S
 
 UNITS = Path("/opt/systemd")
 # Another environment beside COMPD.
@@ -234,7 +234,7 @@ import http.client, json, sys, time
 token, requests = sys.argv[1], json.loads(sys.argv[2])
 
 def ask(method, path, body=None, headers={}):
-    connection = http.client.HTTPConnection("127.0.0.1", 7760, timeout=60)
+    connection = http.client.HTTPConnection("127.0.0.1", 7760, timeout=PATIENCE_S)
     connection.request(method, path, None if body is None else json.dumps(body), headers)
     return connection.getresponse()
 

@@ -12,7 +12,6 @@ from tests.system.test_pages import TUTORIAL
 
 @pytest.mark.long
 @pytest.mark.sample
-@pytest.mark.timeout(600)
 def test_the_tutorial_of_the_missing_effect(capsys: pytest.CaptureFixture[str]) -> None:
     """The error of the live tip ends below half of what it was, as the page says that it does."""
     run_page(TUTORIAL)

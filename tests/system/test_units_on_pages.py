@@ -18,7 +18,7 @@ from tests.support.measured import gauges, hidden
 from tests.support.measured import record as measured
 from tests.support.workbench_page import page_without_machine, workbench_tabs
 
-pytestmark = [pytest.mark.timeout(400), pytest.mark.long]
+pytestmark = pytest.mark.long
 
 # A unit that stands alone or in a quotient; columns and options have it in their names.
 PLAIN = re.compile(r"(?<![\w.-])u(?:m|rad)\b(?![.=(])")

@@ -22,7 +22,6 @@ from compd.simulation.causes.hidden_cause import HiddenCause
 PPM_PER_K = 1.5
 
 
-@pytest.mark.timeout(600)
 @pytest.mark.parametrize(
     ("name", "degC"),
     [

@@ -96,6 +96,11 @@ class SimulatedLine:
         self._wake()
         self._applied.wait()
 
+    @property
+    def replies_under_way(self) -> int:
+        """Number of replies that are not written whole yet."""
+        return len(self._replies)
+
     def _wake(self) -> None:
         os.write(self._wake_write, b"!")
 

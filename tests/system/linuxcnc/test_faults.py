@@ -27,7 +27,6 @@ STANDS_MM = 1e-5
 pytestmark = [
     pytest.mark.long,
     pytest.mark.sample,
-    pytest.mark.timeout(300),
     pytest.mark.skipif(bool(obstacle()), reason=obstacle()),
 ]
 

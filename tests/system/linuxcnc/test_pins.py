@@ -13,7 +13,7 @@ from tests.support.setpoint_sender import SetpointSender
 from tests.support.simulated import run_directory
 from tests.support.watching import until
 
-pytestmark = [pytest.mark.timeout(180), pytest.mark.long, pytest.mark.skipif(bool(obstacle()), reason=obstacle())]
+pytestmark = [pytest.mark.long, pytest.mark.skipif(bool(obstacle()), reason=obstacle())]
 
 # What the daemon asks for with the base of config/hexapod.yaml up by 10 um at machine zero.
 UP_10_UM_MM = 0.00914

@@ -45,7 +45,6 @@ def run(machine: LinuxCnc, program: Path) -> TipErrors:
 
 
 @pytest.mark.long
-@pytest.mark.timeout(400)
 def test_the_tip_error_at_rest_is_ten_times_smaller_with_corrections(machine: LinuxCnc) -> None:
     """Half an hour of warming up passes first, with corrections; then the program runs without them, and with them."""
     program = machine.directory / "program.ngc"

@@ -12,7 +12,7 @@ from tests.support.setpoint_sender import SetpointSender
 from tests.support.simulated import run_directory
 from tests.support.watching import until
 
-pytestmark = [pytest.mark.timeout(180), pytest.mark.long, pytest.mark.skipif(bool(obstacle()), reason=obstacle())]
+pytestmark = [pytest.mark.long, pytest.mark.skipif(bool(obstacle()), reason=obstacle())]
 
 ASKED_MM = [0.010, -0.020, 0.030]
 # A line that names link or joint 3, 4 or 5.

@@ -8,7 +8,7 @@ from tests.support.live_page import opened, until
 from tests.support.measured import gauges, hidden, record
 from tests.support.workbench_page import page_without_machine
 
-pytestmark = [pytest.mark.timeout(180), pytest.mark.long]
+pytestmark = pytest.mark.long
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import pytest
 
-pytestmark = pytest.mark.timeout(180)
-
 
 def imported(tab, module, body, given=None):
     return tab.evaluate(f"async (given) => {{ const from = await import('/static/{module}'); {body} }}", given)

@@ -11,14 +11,14 @@ import pytest
 from tests.support.live_page import until
 from tests.support.measured import gauges, hidden, record
 from tests.support.other_process import family, is_alive
+from tests.support.patience import PATIENCE_S
 from tests.support.workbench_page import open_recording, page_without_machine, workbench_tabs
 
-pytestmark = [pytest.mark.timeout(180), pytest.mark.long]
+pytestmark = pytest.mark.long
 
 DONE = "document.querySelector('#diagnosis-outcome .word')"
 RUNNING = "document.getElementById('diagnose').textContent.startsWith('Cancel')"
 PANEL = "bench.panels.find((panel) => panel.constructor.name === 'Diagnosis')"
-PATIENCE_S = 20.0
 
 
 @pytest.fixture(scope="module")

@@ -10,7 +10,7 @@ from compd.client import connect
 from tests.support.live_models import file_with
 from tests.support.live_page import LivePage, opened, page_process, until
 
-pytestmark = [pytest.mark.timeout(180), pytest.mark.long]
+pytestmark = pytest.mark.long
 
 
 @pytest.fixture

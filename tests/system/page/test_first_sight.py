@@ -2,13 +2,9 @@
 
 from __future__ import annotations
 
-import pytest
-
 from tests.support.live_page import until
 from tests.support.measured import gauges, hidden, record
 from tests.support.workbench_page import SHOWN, page_without_machine
-
-pytestmark = pytest.mark.timeout(180)
 
 
 def test_a_recording_opens_with_what_to_do_and_diagnose_and_machine_in_sight(chromium, tmp_path):

@@ -12,7 +12,7 @@ from tests.support.live_page import until
 from tests.support.measured import gauges, hidden, record
 from tests.support.workbench_page import SHOWN, page_without_machine, workbench_tabs
 
-pytestmark = [pytest.mark.timeout(180), pytest.mark.long]
+pytestmark = pytest.mark.long
 
 GROWTH = "k * link_mm * (temperature_link - 20) / 1000"
 

@@ -13,7 +13,7 @@ from tests.support.command import run_in_process
 from tests.support.live_page import page_process, until
 from tests.support.log_files import BOOK, GERMAN, LEGS, POINTS, ROWS, TABBED, write_log_files
 
-pytestmark = [pytest.mark.timeout(180), pytest.mark.long]
+pytestmark = pytest.mark.long
 
 
 @pytest.fixture(scope="module")

@@ -11,7 +11,7 @@ from tests.support.command import run_in_process
 from tests.support.join_files import GAUGES, GAUGES_WITH_PLACES, GERMAN_TRACK, POINTS, TRACK, write_join_files
 from tests.support.live_page import page_process, until
 
-pytestmark = [pytest.mark.timeout(180), pytest.mark.long]
+pytestmark = pytest.mark.long
 
 
 @pytest.fixture(scope="module")

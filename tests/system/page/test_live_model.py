@@ -10,9 +10,10 @@ from compd.client import connect
 from compd.configuration import load_machine
 from tests.support.live_page import LivePage, page_process, until
 from tests.support.measured import gauges, hidden, record
+from tests.support.patience import PATIENCE_S
 from tests.support.workbench_page import SHOWN, open_recording
 
-pytestmark = [pytest.mark.timeout(180), pytest.mark.long]
+pytestmark = pytest.mark.long
 
 ZEROS_UM = (12.0, -8.0, 5.0)
 
@@ -27,7 +28,7 @@ def directory(tmp_path):
 @pytest.fixture
 def daemon(live):
     """A client of the daemon, which runs without models before and afterwards."""
-    with connect(live.socket, timeout_s=30.0) as client:
+    with connect(live.socket, timeout_s=PATIENCE_S) as client:
         yield client
         client.model("")
         client.model("", shadow=True)
@@ -56,7 +57,7 @@ def add_by_mouse(tab, effect):
     until(tab, "bench.trial")
     tab.locator("#add").click()
     # it is there when the diagnosis has said whether the rows support it
-    tab.locator("#confirm").click(timeout=120_000)
+    tab.locator("#confirm").click(timeout=1e3 * PATIENCE_S)
     until(tab, f"bench.summary?.ledger.length === 1 && {SHOWN}")
 
 

@@ -9,8 +9,6 @@ import pytest
 
 from tests.support.live_page import opened, until
 
-pytestmark = pytest.mark.timeout(180)
-
 
 def text(tab, selector):
     return tab.locator(selector).inner_text()

@@ -20,7 +20,7 @@ from tests.support.paths import CONFIG
 from tests.support.simulated import tripod
 from tests.support.workbench_page import page_without_machine
 
-pytestmark = [pytest.mark.timeout(600), pytest.mark.long]
+pytestmark = pytest.mark.long
 
 # The first number that is looked through; from here on nobody has looked at what they hide.
 FIRST = 100

@@ -17,7 +17,7 @@ from tests.support.live_page import page_process, running_machine
 from tests.support.naive_user import NaiveUser
 from tests.support.paths import CONFIG
 
-pytestmark = [pytest.mark.timeout(600), pytest.mark.long]
+pytestmark = pytest.mark.long
 
 # Hides the growth of the links with temperature, which the running machine measures, too.
 HIDDEN = 4

@@ -10,8 +10,6 @@ from compd.setpoint_states import State
 from tests.support.live_page import opened, until
 from tests.support.scripted_page import COLUMNS, scripted
 
-pytestmark = pytest.mark.timeout(180)
-
 SIZES = [(1366, 768), (1920, 1080), (768, 1024), (390, 844), (3840, 2160)]
 WAITS = "waits for a person: scale 1 (scale_1.position): distrusted (came back 16 mm away)"
 # As long as a daemon tells it: 300 bytes.

@@ -10,8 +10,9 @@ from compd.client import connect
 from compd.errors import DaemonError
 from tests.support.live_models import file_with
 from tests.support.live_page import opened, until
+from tests.support.patience import PATIENCE_S
 
-pytestmark = [pytest.mark.timeout(180), pytest.mark.long]
+pytestmark = pytest.mark.long
 
 # Where the computer has too much to do, a gauge may be late just when zero is taken; a person tries again, too.
 TRIES = 5
@@ -22,7 +23,7 @@ SCALES = ("scale_1.position", "scale_2.position", "scale_3.position")
 @pytest.fixture
 def daemon(live):
     """A client of the daemon; afterwards it has no models."""
-    with connect(live.socket, timeout_s=30.0) as client:
+    with connect(live.socket, timeout_s=PATIENCE_S) as client:
         yield client
         client.model("")
         client.model("", shadow=True)

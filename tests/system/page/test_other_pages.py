@@ -13,7 +13,7 @@ from compd.demo.processes import Command, run_commands
 from compd.machine_kinds import KINDS, machine_text
 from tests.support.live_page import opened, served, until
 
-pytestmark = [pytest.mark.timeout(180), pytest.mark.long]
+pytestmark = pytest.mark.long
 
 
 def test_who_may_look_only_can_order_nothing_and_the_end_of_the_daemon_is_seen(chromium):

@@ -29,8 +29,6 @@ MADE_OF = PICTURE.with_suffix(".made-of.txt")
 # The machine warms up for so long before the picture, s; its weather is 60 times faster than real.
 SHOWN_AFTER_S = 70.0
 
-pytestmark = pytest.mark.timeout(300)
-
 
 def page_files() -> str:
     """Hash of all that the browser gets."""

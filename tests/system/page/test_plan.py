@@ -14,7 +14,7 @@ from tests.support.live_page import until
 from tests.support.measured import gauges, hidden, record
 from tests.support.workbench_page import page_without_machine, workbench_tabs
 
-pytestmark = [pytest.mark.timeout(180), pytest.mark.long]
+pytestmark = pytest.mark.long
 
 
 @pytest.fixture(scope="module")

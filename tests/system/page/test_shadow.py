@@ -10,7 +10,7 @@ from compd.client import connect
 from tests.support.live_models import file_with
 from tests.support.live_page import until
 
-pytestmark = [pytest.mark.timeout(180), pytest.mark.long]
+pytestmark = pytest.mark.long
 
 
 @contextmanager

@@ -9,8 +9,6 @@ from tests.support.live_page import opened, until
 from tests.support.sampled import sampled
 from tests.support.scripted_page import scripted
 
-pytestmark = pytest.mark.timeout(180)
-
 # By the tone of a state: the ground of the banner. Hold and fade are hatched as well.
 GROUNDS = {"good": "rgb(0, 113, 79)", "care": "rgb(138, 90, 0)", "bad": "rgb(169, 68, 0)", "gone": "rgb(87, 96, 106)"}
 TONES = {

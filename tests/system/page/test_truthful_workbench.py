@@ -10,8 +10,6 @@ from tests.support.live_page import until
 from tests.support.measured import gauges, hidden, record
 from tests.support.workbench_page import SHOWN, page_without_machine, workbench_tabs
 
-pytestmark = pytest.mark.timeout(240)
-
 GREEN = "rgb(0, 158, 115)"
 # Of each effect it is known whether the rows support it.
 ANSWERED = "bench.warnings.size >= document.querySelectorAll('.effect .share').length"

@@ -16,7 +16,6 @@ from tests.support.workbench_page import page_without_machine
 REAL = SHARED / "real"
 
 pytestmark = [
-    pytest.mark.timeout(300),
     pytest.mark.long,
     pytest.mark.skipif(not REAL.is_dir(), reason=f"{REAL} is not there: recordings of real machines"),
 ]

@@ -12,7 +12,7 @@ from tests.support.measured import gauges, hidden, record
 from tests.support.workbench_page import page_without_machine
 from tests.system.page.test_workbench import lasso
 
-pytestmark = [pytest.mark.timeout(600), pytest.mark.long]
+pytestmark = pytest.mark.long
 SLOW_S = 200.0
 
 

@@ -18,7 +18,7 @@ from tests.support.live_page import page_process, until
 from tests.support.simulated import run_directory
 from tests.support.workbench_page import SHOWN
 
-pytestmark = [pytest.mark.timeout(600), pytest.mark.long]
+pytestmark = pytest.mark.long
 
 # What the tutorial of the command line hides, too.
 HIDDEN = 125

@@ -15,13 +15,13 @@ from compd.page.broadcast import LIVE_HZ
 from tests.support.event_stream import EventStream, connected, cookie_of, host_of, request
 from tests.support.live_page import page_process, running_machine
 from tests.support.other_process import family, is_alive
+from tests.support.patience import PATIENCE_S
 
-pytestmark = [pytest.mark.timeout(600), pytest.mark.long]
+pytestmark = pytest.mark.long
 
 LATE_S = 0.3
 # Of a computer that is busy with other things, too: the best of so many tries counts.
 TRIES = 3
-PATIENCE_S = 60.0
 
 
 @pytest.fixture(scope="module")

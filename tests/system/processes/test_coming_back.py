@@ -12,9 +12,10 @@ from compd.setpoint_states import State
 from tests.injection import faults
 from tests.injection.rig import InjectedMachine
 from tests.injection.trial import BACK_WITHIN_S, settle
+from tests.support.patience import PATIENCE_S
 from tests.support.process_checks import is_ok, started_again, starts
 from tests.support.simulated import run_directory
-from tests.support.watching import PATIENCE_S, Seen, until
+from tests.support.watching import Seen, until
 
 # At rest a valid setpoint is nearer to the truth.
 NOISE_UM = 10.0

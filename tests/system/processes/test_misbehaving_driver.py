@@ -16,7 +16,7 @@ from tests.support.processes import Machine
 from tests.support.watching import until
 
 # Two minutes in all.
-pytestmark = [pytest.mark.long]
+pytestmark = pytest.mark.long
 
 # How long a misdeed is watched after its first effect.
 WATCHED_S = 2.0

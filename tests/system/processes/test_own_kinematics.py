@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import time
 from collections.abc import Iterator
 from io import StringIO
 from pathlib import Path
@@ -16,10 +17,11 @@ from compd.client import Client, connect
 from compd.errors import DaemonError
 from tests.support.external_machines import GANTRY, Served, class_geometry, served
 from tests.support.live_models import SPINDLE_GROWTH, file_with
+from tests.support.patience import PATIENCE_S
+from tests.support.processes import takes_zero
 from tests.support.running_daemon import supervised
+from tests.support.watching import until
 
-PATIENCE_S = 30
-CYCLES = 1000
 # The gantry is less square than the class says, by so much more of x along y.
 SQUARE = {
     "id": "square",
@@ -31,11 +33,13 @@ SQUARE = {
 
 
 def first(messages: Iterator[Any], wanted: Any) -> Any:
-    """The first message that is wanted, of a bounded number."""
-    for _, message in zip(range(CYCLES), messages, strict=False):
+    """The first message that is wanted."""
+    end_s = time.monotonic() + PATIENCE_S
+    for message in messages:
         if wanted(message):
             return message
-    raise AssertionError(f"never, still {message}")
+        assert time.monotonic() < end_s, f"never, still {message}"
+    raise AssertionError("no more messages come")
 
 
 def running(device: Served) -> Any:
@@ -48,9 +52,8 @@ def connected(device: Served) -> Client:
 
 def take_zero(client: Client) -> None:
     """As soon as every gauge is read."""
-    statuses = (client.status() for _ in range(CYCLES))
-    first(statuses, lambda status: all(gauge["quality"] == "ok" for gauge in status["gauges"]))
-    client.zero()
+    until("every gauge is read", lambda: all(gauge["quality"] == "ok" for gauge in client.status()["gauges"]))
+    until("machine zero is taken", lambda: takes_zero(client))
 
 
 def is_ok(setpoint: Any) -> bool:

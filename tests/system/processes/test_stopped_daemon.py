@@ -14,9 +14,10 @@ import pytest
 
 from compd.clock import MonotonicClock
 from tests.support.daemon_process import Daemon
+from tests.support.patience import PATIENCE_S
 from tests.support.process_checks import is_ok
 from tests.support.sampled import sampled
-from tests.support.watching import PATIENCE_S, until
+from tests.support.watching import until
 
 
 def pause(duration_s: float) -> None:

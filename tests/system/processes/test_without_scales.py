@@ -16,8 +16,9 @@ from compd.rotation import rotation_matrix
 from tests.support.external_machines import served
 from tests.support.live_models import file_with
 from tests.support.model_machines import inverse_pose
+from tests.support.patience import PATIENCE_S
 from tests.support.running_daemon import supervised
-from tests.system.processes.test_own_kinematics import PATIENCE_S, first, is_ok, take_zero
+from tests.system.processes.test_own_kinematics import first, is_ok, take_zero
 
 # Like every link's own, so that one thermometer serves: 10 ppm/K of each link, since machine zero.
 GROWTH = {

@@ -26,9 +26,12 @@ from compd.lines.kinds.serial.settings import SerialLine
 from compd.plugins import GAUGES, SIMULATED_GAUGES, load, names
 from compd.simulation.wires.simulated_line import SimulatedLine
 from tests.support.paths import ROOT
+from tests.support.patience import PATIENCE_S
 from tests.unit.commissioning.gauge_description.test_capture import talker
 
 RUNNER = CliRunner()
+PATIENT, SOON = ("--timeout", str(PATIENCE_S)), ("--timeout", "0.3")
+BAUD = ("--baud", "115200", "--format", "8N1", *PATIENT)
 MAP = "channels=[{name: a, function: 4, address: 0, type: int16, unit: mm}]"
 
 
@@ -77,7 +80,7 @@ def test_names_are_whole_at_80_columns(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_an_error_in_a_list_of_options_is_said_once(scale: str) -> None:
-    port = ("--port", scale, "--baud", "115200", "--format", "8N1", "--set", "unit=1")
+    port = ("--port", scale, *BAUD, "--set", "unit=1")
     with pytest.raises(CompdError) as caught:
         run_gauge("read", "modbus", *port, "--set", MAP.replace("unit: mm", "unit: ells"))
     assert [problem.where for problem in caught.value.problems] == ["--set channels.0.unit"]
@@ -93,7 +96,7 @@ def test_show_has_every_key_of_a_description_down_to_the_last() -> None:
 
 
 def test_read_shows_the_bytes_and_the_value(scale: str) -> None:
-    code, output = run_gauge("read", "heidenhain_nd28x", "--port", scale, "--baud", "115200", "--format", "8N1")
+    code, output = run_gauge("read", "heidenhain_nd28x", "--port", scale, *BAUD)
     assert code == 0
     assert "> 02 " in output
     assert "2b 20 20" in output
@@ -136,13 +139,15 @@ def test_a_serial_port_needs_baud_and_format(scale: str) -> None:
 
 
 def test_keys_of_the_line_stand_on_the_command_line(scale: str) -> None:
-    port = ("--port", scale, "--baud", "115200", "--format", "8N1", "--timeout", "0.2")
+    port = ("--port", scale, *BAUD)
     code, output = run_gauge("read", "heidenhain_nd28x", *port, "--line", "pause_s=0.02")
     assert (code, "1.250000 mm" in output) == (0, True)
     code, output = run_gauge("read", "heidenhain_nd28x", *port, "--line", "echo=true")
     assert code == 1
     assert "see `echo` of the line" in output
-    code, output = run_gauge("read", "modbus", *port, "--line", "kind=modbus_ascii", "--set", "unit=1", "--set", MAP)
+    code, output = run_gauge(
+        "read", "modbus", *port, *SOON, "--line", "kind=modbus_ascii", "--set", "unit=1", "--set", MAP
+    )
     assert "> 3a 30 31 30 34" in output, ":0104, as text"
 
 
@@ -155,15 +160,13 @@ def test_keys_of_the_line_stand_on_the_command_line(scale: str) -> None:
     ],
 )
 def test_a_key_of_the_line_that_cannot_be(scale: str, key: str, problem: str) -> None:
-    port = ("--port", scale, "--baud", "115200", "--format", "8N1")
+    port = ("--port", scale, *BAUD)
     with pytest.raises(CompdError, match=problem):
         RUNNER.invoke(gauge_cli.gauge, ["read", "heidenhain_nd28x", *port, "--line", key], catch_exceptions=False)
 
 
 def test_watch_counts(scale: str) -> None:
-    code, output = run_gauge(
-        "watch", "heidenhain_nd28x", "--port", scale, "--baud", "115200", "--format", "8N1", "--polls", "5"
-    )
+    code, output = run_gauge("watch", "heidenhain_nd28x", "--port", scale, *BAUD, "--polls", "5")
     assert code == 0
     assert "5 polls" in output
     assert "faults: none" in output
@@ -251,7 +254,7 @@ def test_what_learn_writes_is_what_read_and_watch_take(scale: str, tmp_path: Pat
     capture = tmp_path / "capture.txt"
     replies = [f'< "{sign}{number:10.4f}    \\r\\n"\n' for sign, number in (("+", 12.3456), ("-", 0.5), ("+", 1.2))]
     capture.write_text("".join(['# a scale display\n> "\\x02"\n', *replies]))
-    written, port = tmp_path / "gauge.yaml", ("--port", scale, "--baud", "115200", "--format", "8N1")
+    written, port = tmp_path / "gauge.yaml", ("--port", scale, *BAUD)
     code, output = run_gauge("learn", str(capture), "--unit", "mm", "--range=-20,20", *port, "--to", str(written))
     assert code == 0
     assert written.read_text() in output
@@ -291,7 +294,7 @@ def test_a_file_of_gauges_without_their_line_takes_it_from_the_command_line(scal
         run_gauge("read", str(file), "a")
     with pytest.raises(CompdError, match="name one of its gauges"):
         run_gauge("read", str(file))
-    code, output = run_gauge("read", str(file), "a", "--port", scale, "--baud", "115200", "--format", "8N1")
+    code, output = run_gauge("read", str(file), "a", "--port", scale, *BAUD)
     assert (code, "a.position: 1.250000 mm" in output) == (0, True)
 
 
@@ -313,7 +316,7 @@ def test_a_range_that_is_none() -> None:
 
 def test_replies_of_a_live_gauge_are_kept_where_questions_are_left(scale: str) -> None:
     """The simulated display stands still: its replies do not differ, and that is said. Nobody presses Enter."""
-    port = ("--port", scale, "--baud", "115200", "--format", "8N1", "--timeout", "0.3")
+    port = ("--port", scale, *BAUD, *SOON)
     result = RUNNER.invoke(gauge_cli.gauge, ["learn", *port, *LEARN, "--out", r"\x02", "--replies", "3"])
     assert isinstance(result.exception, CompdError)
     assert "too few that differ" in str(result.exception)
@@ -328,7 +331,18 @@ def test_learn_a_device_that_sends_unsolicited(tmp_path: Path) -> None:
     written = tmp_path / "gauge.yaml"
     with talker(0.02) as port:
         code, _ = run_gauge(
-            "learn", "--port", port, "--baud", "9600", "--format", "8N1", *LEARN, "--to", str(written), answers=6 * "\n"
+            "learn",
+            "--port",
+            port,
+            "--baud",
+            "9600",
+            "--format",
+            "8N1",
+            *PATIENT,
+            *LEARN,
+            "--to",
+            str(written),
+            answers=6 * "\n",
         )
         assert code == 0
         code, output = run_gauge("watch", str(written), "--polls", "5")

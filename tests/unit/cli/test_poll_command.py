@@ -17,10 +17,10 @@ from compd.configuration import load
 from compd.documents import read_document
 from compd.operation_settings import SocketSettings, StateSettings
 from tests.support.paths import CONFIG
+from tests.support.patience import PATIENCE_S
 from tests.support.running_daemon import supervised
 from tests.support.serial_gateway import SerialGateway, serial_gateway
 
-TIMEOUT_S = 60.0
 WATCH_HZ, MAX_SETPOINTS = 20.0, 400
 UNITS, EXCHANGE_S, WAIT_S = 2, 0.001, 1.0
 # The second poll that costs the other unit its reading: from then on it is asked every 100 s.
@@ -56,7 +56,7 @@ def test_a_unit_that_has_come_back_is_asked_at_once(tmp_path: Path) -> None:
             result = CliRunner().invoke(app, ["gauge", "poll", gauge, "--daemon", str(socket)])
             return result.exit_code, result.output
 
-        with supervised(configuration), connect(socket, TIMEOUT_S) as client:
+        with supervised(configuration), connect(socket, PATIENCE_S) as client:
             watched = client.watch(WATCH_HZ)
 
             def until_polled(gauge: str, times: int, quality: str) -> None:

@@ -23,10 +23,10 @@ from compd.live.record import RecordedCycles, replay_cycles
 from compd.operation_settings import SocketSettings, StateSettings
 from compd.recording import OpenPart, convert_recording, read_recording
 from tests.support.live_machine import CONFIG
+from tests.support.patience import PATIENCE_S
 from tests.support.running_daemon import supervised
 from tests.support.sampled import sampled
 
-TIMEOUT_S = 60
 NEVER_STALE_S = 1e6
 
 
@@ -70,11 +70,11 @@ def daemon_at(directory):
     loop = loaded.loop.model_copy(update={"stale_after_s": NEVER_STALE_S, "lock_memory": False, "rate_hz": 100})
     configuration = replace(loaded, loop=loop, sockets=sockets, state=StateSettings(directory=str(directory / "state")))
     with supervised(configuration) as daemon:
-        with connect(directory / "s", TIMEOUT_S) as watching:
+        with connect(directory / "s", PATIENCE_S) as watching:
             next(setpoint for setpoint in watching.watch() if setpoint["state"] == "no_zero")
             watching.zero()
         # another one: who watches and does not read while a command starts is dropped
-        with connect(directory / "s", TIMEOUT_S) as client:
+        with connect(directory / "s", PATIENCE_S) as client:
             yield configuration, daemon, client
 
 
@@ -132,7 +132,7 @@ def test_killed_in_the_middle_it_reads_back_cleanly_and_replays(tmp_path):
             until_rows(client, path, 60)
             on_disk = path.read_bytes()
             process.send_signal(signal.SIGKILL)
-            process.wait(TIMEOUT_S)
+            process.wait(PATIENCE_S)
     assert path.read_bytes().startswith(on_disk), "what was on disk stays there"
     found = read_recording(path, configuration, needs_reference=False)
     assert found.rows >= 60
@@ -152,7 +152,7 @@ def test_killed_while_it_writes_parquet_every_synchronised_row_is_there_and_repl
             until_rows(client, left, 60)
             on_disk = left.read_bytes()
             process.send_signal(signal.SIGKILL)
-            process.wait(TIMEOUT_S)
+            process.wait(PATIENCE_S)
     assert left.read_bytes().startswith(on_disk), "what was on disk stays there"
     rows = convert_recording(left, left.with_suffix(".parquet"))
     assert rows >= 60
@@ -171,7 +171,7 @@ def test_it_ends_at_a_signal_with_everything_written(tmp_path, end):
         with record_command(tmp_path, "--rate-hz", "20") as process:
             until_rows(client, tmp_path / "run-0001.csv", 10)
             process.send_signal(end)
-            _, said = process.communicate(timeout=TIMEOUT_S)
+            _, said = process.communicate(timeout=PATIENCE_S)
         assert process.returncode == 0
     rows = rows_in(tmp_path / "run-0001.csv")
     assert f"{rows} rows in 1 part" in said
@@ -189,12 +189,12 @@ def test_it_goes_on_in_a_new_part_when_the_daemon_has_started_anew(tmp_path):
             process = stack.enter_context(record_command(tmp_path))
             until_rows(client, tmp_path / "run-0001.csv", 3)
         assert "the daemon is gone" in process.stderr.readline()
-        with supervised(configuration), connect(tmp_path / "s", TIMEOUT_S) as again:
+        with supervised(configuration), connect(tmp_path / "s", PATIENCE_S) as again:
             assert "the daemon is back: nothing was recorded for " in process.stderr.readline()
             assert "run-0002.csv begins" in process.stderr.readline()
             until_rows(again, tmp_path / "run-0002.csv", 3)
             process.send_signal(signal.SIGINT)
-            _, said = process.communicate(timeout=TIMEOUT_S)
+            _, said = process.communicate(timeout=PATIENCE_S)
         assert process.returncode == 0
     rows = sum(rows_in(tmp_path / f"run-000{part}.csv") for part in (1, 2))
     assert f"{rows} rows in 2 parts" in said
@@ -211,7 +211,7 @@ def test_while_the_daemon_is_away_ctrl_c_ends_it_with_everything_written(tmp_pat
         os.kill(client.status()["processes"]["supervisor"]["pid"], signal.SIGTERM)
         assert "the daemon is gone" in process.stderr.readline()
         process.send_signal(signal.SIGINT)
-        _, said = process.communicate(timeout=TIMEOUT_S)
+        _, said = process.communicate(timeout=PATIENCE_S)
         assert process.returncode == 0
     assert f"{rows_in(tmp_path / 'run-0001.csv')} rows in 1 part" in said
 
@@ -247,7 +247,7 @@ def test_a_burst_has_every_cycle_for_as_long_as_asked_and_no_longer(tmp_path, ca
 @pytest.mark.long
 @pytest.mark.usefixtures("drifting")
 def test_a_recorder_that_reads_nothing_for_a_while_is_not_dropped_and_misses_nothing(tmp_path):
-    with daemon_at(tmp_path) as (_, _, client), connect(tmp_path / "s", TIMEOUT_S) as slow:
+    with daemon_at(tmp_path) as (_, _, client), connect(tmp_path / "s", PATIENCE_S) as slow:
         lines = slow.readings()
         next(lines)
         seqs = [next(lines)[1]["seq"]]
@@ -262,11 +262,11 @@ def test_a_recorder_that_reads_nothing_for_a_while_is_not_dropped_and_misses_not
 def test_readings_are_for_the_unix_socket_and_say_what_went_into_the_setpoint(tmp_path):
     with daemon_at(tmp_path) as (_, daemon, client):
         with (
-            connect(f"127.0.0.1:{daemon.listeners.tcp_port}", TIMEOUT_S) as remote,
+            connect(f"127.0.0.1:{daemon.listeners.tcp_port}", PATIENCE_S) as remote,
             pytest.raises(DaemonError, match="Unix socket only"),
         ):
             next(remote.readings())
-        with connect(tmp_path / "s", TIMEOUT_S) as local:
+        with connect(tmp_path / "s", PATIENCE_S) as local:
             lines = local.readings(50)
             _, answer = next(lines)
             assert answer["rate_hz"] == 50

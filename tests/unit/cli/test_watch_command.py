@@ -11,6 +11,7 @@ from rich.console import Console
 
 from compd.cli.live.watch import NewestSetpoint
 from compd.errors import DaemonError
+from tests.support.patience import PATIENCE_S
 
 STATUS = {"time_s": 0.0, "loop": {"rate_hz": 200, "missed_cycles": 0}, "gauges": []}
 SETPOINT = {
@@ -27,7 +28,6 @@ SETPOINT = {
     "correction_mm": [0.001] * 3,
     "sources_mm": {"joints": [0.001] * 3},
 }
-TIMEOUT_S = 20
 
 
 class Daemon:
@@ -43,7 +43,7 @@ class Daemon:
     def watch(self, rate_hz):
         yield SETPOINT
         self.sent.set()
-        assert self.dies.wait(TIMEOUT_S)
+        assert self.dies.wait(PATIENCE_S)
         raise DaemonError.of("here", "the daemon is gone")
 
 
@@ -51,7 +51,7 @@ class Daemon:
 def shown(request):
     daemon, clock = Daemon(), SimpleNamespace(monotonic=lambda: clock.now_s, now_s=100.0)
     newest = NewestSetpoint(daemon, 10.0, clock, request.param)
-    assert daemon.sent.wait(TIMEOUT_S)
+    assert daemon.sent.wait(PATIENCE_S)
 
     def text():
         console = Console(width=80, record=True, file=io.StringIO())
@@ -78,6 +78,6 @@ def test_a_setpoint_is_shown_as_long_as_it_is_valid_and_then_nothing_of_it(shown
 def test_when_the_daemon_is_gone_no_number_stays_on_the_screen(shown):
     shown.daemon.dies.set()
     with pytest.raises(DaemonError, match="gone"):
-        shown.newest.wait(TIMEOUT_S)
+        shown.newest.wait(PATIENCE_S)
     assert "190.00000" not in shown.text()
     assert "NO SETPOINT" in shown.text()

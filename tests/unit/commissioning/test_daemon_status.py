@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import socket
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +13,9 @@ import pytest
 from typer.testing import CliRunner
 
 from compd.cli.app import app
+from compd.client import Client
+from compd.client_connection import ClientConnection
+from compd.commissioning import daemon_health
 from compd.commissioning.daemon_health import Health, daemon_status, worst_gauges
 from compd.setpoint_states import State
 from tests.unit.live.test_client import scripted
@@ -84,15 +87,14 @@ def test_no_answer_is_unknown(address: str) -> None:
     assert len(text.splitlines()) == 1
 
 
-def test_a_daemon_that_makes_no_setpoint_is_critical(tmp_path: Path) -> None:
-    def script(connection: socket.socket) -> None:
-        connection.sendall(json.dumps(VERSION).encode() + b"\n")
-        connection.recv(4096)
-        connection.sendall(json.dumps({"class": "STATUS", "gauges": []}).encode() + b"\n")
-        connection.recv(4096)
-
-    with scripted(tmp_path / "s", script) as address:
-        found = daemon_status(address, timeout_s=0.2)
+def test_a_daemon_that_makes_no_setpoint_is_critical(monkeypatch: pytest.MonkeyPatch) -> None:
+    ours, daemon = socket.socketpair()
+    for answer in (VERSION, {"class": "STATUS", "gauges": []}):  # they are there before they are waited for
+        daemon.sendall(json.dumps(answer).encode() + b"\n")
+    ours.settimeout(0.01)
+    monkeypatch.setattr(daemon_health, "connect", lambda *_: Client(ClientConnection(ours, "here")))
+    with closing(daemon):
+        found = daemon_status("here")
     assert found.health is Health.CRITICAL
     assert "no setpoint" in found.text
 

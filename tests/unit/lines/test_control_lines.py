@@ -25,7 +25,8 @@ from compd.lines.control_lines import ControlLines
 from compd.lines.port import TcpPort
 from compd.lines.stream import StreamLine
 from tests.support.ascii_gauge import gauge, line_with
-from tests.support.wire_rig import PATIENCE_S, SETTINGS, InstantClock, ScriptedPort
+from tests.support.patience import PATIENCE_S
+from tests.support.wire_rig import SETTINGS, InstantClock, ScriptedPort
 
 # pyserial's client names its thread in a way that Python has given up.
 pytestmark = pytest.mark.filterwarnings("ignore:setDaemon:DeprecationWarning", "ignore:setName:DeprecationWarning")

@@ -13,6 +13,7 @@ from compd.lines.stream import StreamLine
 from compd.live.acquisition.acquisition import LineThread
 from compd.live.memory import Latest
 from tests.support.ascii_gauge import gauge
+from tests.support.patience import PATIENCE_S
 from tests.support.wire_rig import SETTINGS, InstantClock, ScriptedPort
 from tests.unit.lines.test_modbus_rtu import counting_slave
 
@@ -86,5 +87,5 @@ def test_the_daemon_says_it() -> None:
     dial = gauge(**{"in": "%f"})
     thread = LineThread("line", settings, [("dial", dial)], {"dial": 1.0}, Latest(["dial.value"]), clock, opened)
     thread.start()
-    assert thread.join(20.0)
+    assert thread.join(PATIENCE_S)
     assert HINT in thread.gauges[0].detail

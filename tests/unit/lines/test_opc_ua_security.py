@@ -14,7 +14,8 @@ from compd.gauge import LineFault, Quality
 from compd.lines import open_line
 from tests.support.certificates import Certificate, certificate
 from tests.support.opc_ua_server import OneUser, OpcUaServer, Security, running_server
-from tests.support.wire_rig import PATIENCE_S, SETTINGS
+from tests.support.patience import PATIENCE_S
+from tests.support.wire_rig import SETTINGS
 
 
 class Plant(NamedTuple):

@@ -20,7 +20,8 @@ from compd.lines import open_line
 from compd.live.acquisition import Acquisition
 from compd.live.system import THIS_COMPUTER
 from tests.support.ascii_gauge import gauge
-from tests.support.wire_rig import PATIENCE_S, SETTINGS, WatchedLatest
+from tests.support.patience import PATIENCE_S
+from tests.support.wire_rig import SETTINGS, WatchedLatest
 
 # pyserial's client names its thread in a way that Python has given up, and leaves its socket to the garbage collector
 # where the server has gone.

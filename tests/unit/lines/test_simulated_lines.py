@@ -38,10 +38,11 @@ class Echo(SimulatedByteDevice):
 
 
 def test_units_on_one_line_answer_to_their_own_number(tmp_path: Path) -> None:
-    with rig(tmp_path, RTU, {"a": room(1), "b": room(2)}, {"room": 20.5}) as bench, bench.open() as line:
-        for name in ("a", "b", "a"):
-            assert outcome(bench.gauges[name], line) == [(Quality.OK, pytest.approx(20.5))]
-        with pytest.raises(LineFault) as caught:
+    with rig(tmp_path, RTU, {"a": room(1), "b": room(2)}, {"room": 20.5}) as bench:
+        with bench.open() as line:
+            for name in ("a", "b", "a"):
+                assert outcome(bench.gauges[name], line) == [(Quality.OK, pytest.approx(20.5))]
+        with bench.open(0.1) as line, pytest.raises(LineFault) as caught:
             line.read_registers(3, 4, 0, 1)
         assert caught.value.quality is Quality.TIMEOUT
 

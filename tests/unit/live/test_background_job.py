@@ -8,8 +8,7 @@ import pytest
 
 from compd.live.service.messages import ErrorCode, ProtocolError
 from compd.live.service.zero_capture import BackgroundJob
-
-TIMEOUT_S = 20
+from tests.support.patience import PATIENCE_S
 
 
 def test_a_second_request_is_refused_while_the_first_is_worked_on():
@@ -18,7 +17,7 @@ def test_a_second_request_is_refused_while_the_first_is_worked_on():
     answers = []
 
     def work():
-        assert finish.wait(TIMEOUT_S)
+        assert finish.wait(PATIENCE_S)
         return b"done"
 
     job.start(work, answers.append)
@@ -44,6 +43,6 @@ def test_whoever_has_the_answer_may_ask_for_the_next_at_once():
         job.start(lambda: b"second", last)
 
     job.start(lambda: b"first", ask_again)
-    assert finished.wait(TIMEOUT_S)
+    assert finished.wait(PATIENCE_S)
     job.join()
     assert answers == [b"first", b"second"]

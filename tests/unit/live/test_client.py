@@ -6,17 +6,18 @@ import json
 import socket
 import threading
 import time
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 
 import pytest
 
 from compd.client import Client, connect
+from compd.client_connection import ClientConnection
 from compd.client_setpoints import ReadSetpoints
 from compd.errors import DaemonError
 from compd.live.service.requests import REQUESTS
+from tests.support.patience import PATIENCE_S
 
 VERSION = b'{"class":"VERSION","protocol":1,"machine":"test"}\n'
-TIMEOUT_S = 20
 
 
 @contextmanager
@@ -32,7 +33,7 @@ def scripted(path, script):
         thread = threading.Thread(target=serve)
         thread.start()
         yield str(path)
-        thread.join(TIMEOUT_S)
+        thread.join(PATIENCE_S)
 
 
 @pytest.mark.parametrize("address", ["127.0.0.1:1", "/nowhere/compd.sock"])
@@ -76,17 +77,16 @@ def test_a_daemon_that_goes_away_ends_the_watching_with_an_error(tmp_path):
             next(setpoints)
 
 
-def test_a_daemon_that_does_not_answer_in_time_is_an_error(tmp_path):
-    released = threading.Event()
-
-    def script(connection):
-        connection.sendall(VERSION)
-        released.wait(TIMEOUT_S)
-
-    with scripted(tmp_path / "s", script) as path, connect(path, timeout_s=0.1) as client:
-        with pytest.raises(DaemonError, match="the daemon is gone"):
-            client.status()
-        released.set()
+def test_a_daemon_that_does_not_answer_in_time_is_an_error():
+    ours, daemon = socket.socketpair()
+    daemon.sendall(VERSION)  # it is there before it is waited for
+    ours.settimeout(0.01)
+    with (
+        closing(daemon),
+        Client(ClientConnection(ours, "here")) as client,
+        pytest.raises(DaemonError, match="the daemon is gone"),
+    ):
+        client.status()
 
 
 def test_setpoints_that_come_before_an_answer_are_not_lost(tmp_path):
@@ -148,9 +148,9 @@ def test_the_latest_setpoint_is_the_newest_and_those_before_it_are_read_away(tmp
     first = b'{"class":"WATCH"}\n' + b"".join(map(setpoint, range(1, 6)))
     second = b"".join(map(setpoint, (6, 7, 8))) + b'{"class":"STATUS","x":5}\n' + setpoint(9)
     with sending(tmp_path / "s", first, second) as client:
-        assert client.latest(TIMEOUT_S)["seq"] == 5
+        assert client.latest(PATIENCE_S)["seq"] == 5
         assert client.status()["x"] == 5
-        assert client.latest(TIMEOUT_S)["seq"] == 9
+        assert client.latest(PATIENCE_S)["seq"] == 9
 
 
 def test_the_latest_setpoint_has_not_expired_and_is_waited_for(tmp_path):
@@ -159,7 +159,7 @@ def test_the_latest_setpoint_has_not_expired_and_is_waited_for(tmp_path):
         with pytest.raises(DaemonError, match="no setpoint that may still be used has come in time"):
             client.latest(0.05)
         client.target(tip_B0_mm=[0, 0, 0])
-        assert client.latest(TIMEOUT_S)["seq"] == 3
+        assert client.latest(PATIENCE_S)["seq"] == 3
 
 
 class Later:
@@ -189,7 +189,7 @@ def test_an_expired_setpoint_that_came_with_an_answer_does_not_end_the_wait():
     assert next(client.watch())["seq"] == 1
     client.status()
     connection.later = [setpoint(3, valid_for_s=-1.0), setpoint(4)]
-    assert client.latest(TIMEOUT_S)["seq"] == 4
+    assert client.latest(PATIENCE_S)["seq"] == 4
 
 
 @pytest.mark.parametrize("state", ["stop", "coasting"])
@@ -197,7 +197,7 @@ def test_the_latest_setpoint_may_be_invalid(tmp_path, state):
     """It has expired when it is made."""
     lines = b'{"class":"WATCH"}\n' + setpoint(1) + setpoint(2, 0.0, state)
     with sending(tmp_path / "s", lines) as client:
-        latest = client.latest(TIMEOUT_S)
+        latest = client.latest(PATIENCE_S)
         assert (latest["seq"], latest["valid"]) == (2, False)
         with pytest.raises(DaemonError, match=r"in time"):
             client.latest(0.0)
@@ -208,18 +208,18 @@ def test_the_latest_setpoint_comes_at_the_rate_that_is_watched(tmp_path):
     with sending(tmp_path / "s", first) as client:
         setpoints = client.watch(10)
         assert next(setpoints)["seq"] == 1
-        assert client.latest(TIMEOUT_S)["seq"] == 2, "no second WATCH: it would be answered with nothing here"
+        assert client.latest(PATIENCE_S)["seq"] == 2, "no second WATCH: it would be answered with nothing here"
 
 
 def test_a_refused_message_and_a_daemon_that_goes_away_end_the_wait_for_the_latest_setpoint(tmp_path):
     refused = b'{"class":"WATCH"}\n' + setpoint(1) + b'{"class":"ERROR","code":"role_taken","text":"another client"}\n'
     with sending(tmp_path / "s", refused) as client:
         with pytest.raises(DaemonError, match="another client"):
-            client.latest(TIMEOUT_S)
-        assert client.latest(TIMEOUT_S)["seq"] == 1
+            client.latest(PATIENCE_S)
+        assert client.latest(PATIENCE_S)["seq"] == 1
         client.target(tip_B0_mm=[0, 0, 0])
         with pytest.raises(DaemonError, match="it closed the connection"):
-            client.latest(TIMEOUT_S)
+            client.latest(PATIENCE_S)
 
 
 class Arrivals:

@@ -23,6 +23,7 @@ from compd.page.daemon_link import DaemonLink
 from compd.page.model_files import ModelFiles
 from compd.page.orders import Orders
 from tests.support.live_models import file_with
+from tests.support.patience import PATIENCE_S
 from tests.unit.live.test_daemon import configuration, first, running, still
 
 __all__ = ["still"]
@@ -54,7 +55,7 @@ def asked_by_nobody(path: Path, *requests: tuple[dict, str | None]) -> list[str]
             os.setgid(path.stat().st_gid)
             os.setuid(NOBODY)
             with socket.socket(socket.AF_UNIX) as peer:
-                peer.settimeout(30)
+                peer.settimeout(PATIENCE_S)
                 peer.connect(str(path))
                 lines = peer.makefile("rb")
                 lines.readline()

@@ -9,6 +9,7 @@ import socket
 import struct
 import subprocess
 import sys
+import time
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -27,9 +28,9 @@ from compd.live.system.systemd import Notifier
 from compd.operation_settings import SocketSettings, StateSettings
 from tests.support.built_machines import drawing
 from tests.support.paths import CONFIG
+from tests.support.patience import PATIENCE_S
 from tests.support.running_daemon import supervised
 
-TIMEOUT_S = 30
 NEVER_STALE_S = 1e6
 
 
@@ -71,16 +72,18 @@ def configuration(directory: Path, name="tripod-cmm.yaml", udp_port=None) -> Con
 
 @contextmanager
 def running(configured: Configuration, notifier=None):
-    with supervised(configured, notifier) as daemon, connect(configured.sockets.unix.path, TIMEOUT_S) as client:
+    with supervised(configured, notifier) as daemon, connect(configured.sockets.unix.path, PATIENCE_S) as client:
         yield daemon, client
 
 
 def first(setpoints, state):
-    """The first setpoint in `state`, of a bounded number."""
-    for _, setpoint in zip(range(2000), setpoints, strict=False):
+    """The first setpoint in `state`."""
+    end_s = time.monotonic() + PATIENCE_S
+    for setpoint in setpoints:
         if setpoint["state"] == state:
             return setpoint
-    raise AssertionError(f"never {state}, still {setpoint}")
+        assert time.monotonic() < end_s, f"never {state}, still {setpoint}"
+    raise AssertionError("no more setpoints come")
 
 
 @pytest.mark.usefixtures("still")
@@ -173,7 +176,7 @@ def test_status_tells_everything_and_holds_no_nan(tmp_path):
 def test_udp_carries_one_packet_per_cycle_and_the_same_numbers(tmp_path):
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as receiver:
         receiver.bind(("127.0.0.1", 0))
-        receiver.settimeout(TIMEOUT_S)
+        receiver.settimeout(PATIENCE_S)
         configured = configuration(tmp_path, "hexapod.yaml", receiver.getsockname()[1])
         with running(configured) as (_, client):
             client.zero()
@@ -200,7 +203,7 @@ def test_udp_names_the_target_that_a_setpoint_answers(tmp_path, name, tip_B0_mm)
     machine = name if name.endswith(".yaml") else drawing(name, tmp_path)
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as receiver:
         receiver.bind(("127.0.0.1", 0))
-        receiver.settimeout(TIMEOUT_S)
+        receiver.settimeout(PATIENCE_S)
         with running(configuration(tmp_path, machine, receiver.getsockname()[1])) as (_, client):
             client.zero()
             made_s = MonotonicClock().monotonic()
@@ -217,7 +220,7 @@ def test_udp_names_the_target_that_a_setpoint_answers(tmp_path, name, tip_B0_mm)
 def test_systemd_hears_ready_and_watchdog_from_the_loop_and_the_state(tmp_path):
     with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as manager:
         manager.bind(str(tmp_path / "notify"))
-        manager.settimeout(TIMEOUT_S)
+        manager.settimeout(PATIENCE_S)
         notifier = Notifier(str(tmp_path / "notify"), watchdog_s=0.1)
         with running(configuration(tmp_path), notifier) as (_, client):
             heard = set()
@@ -243,7 +246,7 @@ def test_run_ends_with_sigterm_and_leaves_no_socket(tmp_path):
     config.write_text(text)
     with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as manager:
         manager.bind(str(tmp_path / "notify"))
-        manager.settimeout(100)
+        manager.settimeout(PATIENCE_S)
         with subprocess.Popen(
             [sys.executable, "-m", "compd", "run", str(config)],
             stderr=subprocess.PIPE,
@@ -253,12 +256,12 @@ def test_run_ends_with_sigterm_and_leaves_no_socket(tmp_path):
             try:
                 while manager.recv(4096) != b"READY=1":
                     pass
-                with connect(tmp_path / "s", TIMEOUT_S) as client:
+                with connect(tmp_path / "s", PATIENCE_S) as client:
                     assert next(client.watch())["state"] == "no_zero"
                     with pytest.raises(DaemonError, match="not every gauge can be read"):
                         client.zero()
                 process.send_signal(signal.SIGTERM)
-                _, log = process.communicate(timeout=TIMEOUT_S)
+                _, log = process.communicate(timeout=PATIENCE_S)
             finally:
                 process.kill()
     assert process.returncode == 0, log

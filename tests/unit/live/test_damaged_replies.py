@@ -32,7 +32,7 @@ from compd.stated_noise import tolerance_mm
 from compd.twins import ModbusSlaves
 from compd.twins.byte_devices import ByteDevices
 from tests.support.paths import CONFIG
-from tests.support.wire_rig import PATIENCE_S
+from tests.support.patience import PATIENCE_S
 
 SECONDS = 12.0
 SHOWN_MM = 0.0012

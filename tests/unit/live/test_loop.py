@@ -128,8 +128,8 @@ def test_the_sleeper_does_not_wake_early_even_through_signals():
     heard = []
     before = signal.signal(signal.SIGALRM, lambda *_: heard.append(time.monotonic()))
     try:
-        end_s = time.monotonic() + 0.05
         signal.setitimer(signal.ITIMER_REAL, 0.005, 0.005)
+        end_s = time.monotonic() + 0.05
         sleep_until(end_s)
         assert time.monotonic() >= end_s
     finally:

@@ -11,8 +11,9 @@ from compd.gauge import LineFault, Quality, Reading, good
 from compd.lines import Ports
 from compd.live.acquisition.acquisition import LineThread
 from compd.live.system import THIS_COMPUTER, System
+from tests.support.patience import PATIENCE_S
 from tests.support.scripted_thread import SETTINGS_TCP, STALE_AFTER_S, CountingLine, ScriptedGauge, ScriptedThread
-from tests.support.wire_rig import PATIENCE_S, WatchedLatest
+from tests.support.wire_rig import WatchedLatest
 
 OK = Quality.OK
 

@@ -21,6 +21,7 @@ from compd.live.memory.latest import Latest
 from compd.live.service.zero_capture import REST_TOLERANCE_MM, ZeroCapture
 from compd.live.system import System
 from tests.support.paths import ROOT
+from tests.support.patience import PATIENCE_S
 
 CONFIG = ROOT / "config" / "tripod-cmm.yaml"
 ZERO = MachineZero("abc", "2026-01-01T00:00:00+00:00", {"a.1": 1.25, "b.1": -0.1})
@@ -359,8 +360,8 @@ def test_the_end_does_not_wait_for_a_disk_that_hangs(tmp_path, monkeypatch):
     monkeypatch.setattr(taking, "write_files", write_files)
     monkeypatch.setattr("compd.live.service.zero_capture._END_WITHIN_S", 0.01)
     taking.taker.start(False, taking.answers.append)
-    assert saving.wait(20)
+    assert saving.wait(PATIENCE_S)
     taking.taker.stop()
     assert taking.answers == []
     disk.set()
-    assert taking.taker._job.join(20)
+    assert taking.taker._job.join(PATIENCE_S)

@@ -18,6 +18,8 @@ from compd.gauge import Gauge, Quality
 from compd.live.acquisition.possible_motion import MotionLimits
 from compd.live.acquisition.reading_trust import ReadingTrust, TrustSettings
 from compd.live.memory.trust_memory import TrustMemory
+from compd.source_time import SAME_TIME_S
+from tests.support.hand_clock import SteppedClock
 from tests.support.mosquitto import Broker, Publisher, needs_mosquitto, publisher, running_broker
 from tests.support.pushed_gauges import STALE_AFTER_S, acquiring, gauge
 
@@ -37,8 +39,8 @@ def device(broker: Broker) -> Iterator[Publisher]:
         yield connected
 
 
-def line_to(broker: Broker) -> dict[str, Any]:
-    return {"kind": "mqtt", "host": "127.0.0.1", "port": broker.port, "keep_alive_s": 1}
+def line_to(broker: Broker, **keys: Any) -> dict[str, Any]:
+    return {"kind": "mqtt", "host": "127.0.0.1", "port": broker.port, **keys}
 
 
 def plain(**keys: Any) -> Gauge[Any]:
@@ -50,17 +52,35 @@ def timed(**keys: Any) -> Gauge[Any]:
     return plain(value="/v", time="/t", **keys)
 
 
-def payload(value: Any, age_s: float = 0.0) -> str:
-    when = datetime.fromtimestamp(time.time() - age_s, UTC)
+def payload(value: Any, age_s: float = 0.0, now_utc_s: float | None = None) -> str:
+    """now_utc_s : None for now, s since 1970."""
+    when = datetime.fromtimestamp((time.time() if now_utc_s is None else now_utc_s) - age_s, UTC)
     return json.dumps({"v": value, "t": when.isoformat()})
 
 
+# Of a value that is not too old, and far from new.
+AGE_S = STALE_AFTER_S / 2
+
+
+def check_time(time_s: float, before_s: float) -> None:
+    """A reading of a source that measured it `AGE_S` before a moment between the monotonic `before_s` and now.
+
+    Where the line's thread is held up between two looks at its clocks, the reading is older by that.
+    """
+    assert before_s - STALE_AFTER_S < time_s <= time.monotonic() - AGE_S + SAME_TIME_S
+
+
 @contextmanager
-def listening(broker: Broker, device: Publisher, measured: Gauge[Any], **keys: Any) -> Iterator[tuple[Any, Any]]:
-    """The line's thread with one gauge, subscribed: it has heard what the broker had kept, which is no value."""
+def listening(
+    broker: Broker, device: Publisher, measured: Gauge[Any], line: dict[str, Any] | None = None, **keys: Any
+) -> Iterator[tuple[Any, Any]]:
+    """The line's thread with one gauge, subscribed: it has heard what the broker had kept, which is no value.
+
+    line : further keys of the line. keys : of `acquiring`.
+    """
     for topic in measured.addresses:  # type: ignore[attr-defined]
         device.publish(topic, "null", retain=True)
-    with acquiring(line_to(broker), {"g": measured}, **keys) as (acquisition, latest):
+    with acquiring(line_to(broker, **(line or {})), {"g": measured}, **keys) as (acquisition, latest):
         for channel in latest.channels:
             latest.wait_for_any(channel)
         yield acquisition, latest
@@ -141,17 +161,17 @@ def test_a_value_without_a_time_is_never_used(broker: Broker, device: Publisher,
 
 def test_the_time_is_that_of_the_source(broker: Broker, device: Publisher) -> None:
     with listening(broker, device, timed()) as (_, latest):
-        since, now_s = latest.now, time.monotonic()
-        device.publish("a", payload(1.5, age_s=0.2))
-        assert latest.wait_for("g.a", OK, since).time_s == pytest.approx(now_s - 0.2, abs=0.1)
+        since, before_s = latest.now, time.monotonic()
+        device.publish("a", payload(1.5, age_s=AGE_S))
+        check_time(latest.wait_for("g.a", OK, since).time_s, before_s)
 
 
 @pytest.mark.parametrize(("form", "unit_s"), [("unix_s", 1), ("unix_ms", 1e-3), ("unix_us", 1e-6), ("unix_ns", 1e-9)])
 def test_times_as_numbers(broker: Broker, device: Publisher, form: str, unit_s: float) -> None:
     with listening(broker, device, timed(time_format=form)) as (_, latest):
-        since, now_s, utc_s = latest.now, time.monotonic(), time.time()
-        device.publish("a", json.dumps({"v": 1.5, "t": (utc_s - 0.1) / unit_s}))
-        assert latest.wait_for("g.a", OK, since).time_s == pytest.approx(now_s - 0.1, abs=0.1)
+        since, before_s = latest.now, time.monotonic()
+        device.publish("a", json.dumps({"v": 1.5, "t": (time.time() - AGE_S) / unit_s}))
+        check_time(latest.wait_for("g.a", OK, since).time_s, before_s)
 
 
 def test_an_old_value_is_stale_however_it_comes(broker: Broker, device: Publisher) -> None:
@@ -203,9 +223,11 @@ def test_what_the_broker_kept_is_not_now(broker: Broker, device: Publisher) -> N
 
 
 def test_silence_becomes_a_timeout_while_the_connection_is_up(broker: Broker, device: Publisher) -> None:
-    with listening(broker, device, timed()) as (acquisition, latest):
+    clock = SteppedClock()
+    with listening(broker, device, timed(), clock=clock) as (acquisition, latest):
         device.publish("a", payload(1.5))
         latest.wait_for("g.a", OK)
+        clock.step(1.01 * STALE_AFTER_S)
         reading = latest.wait_for("g.a", Quality.TIMEOUT)
         assert f"nothing new on a for {STALE_AFTER_S:g} s" in reading.detail
         assert acquisition.status()["l"]["state"] == "open"
@@ -219,13 +241,15 @@ def test_two_topics_of_one_gauge_do_not_wait_for_each_other(broker: Broker, devi
         "mqtt",
         channels=[{"name": n, "topic": n, "value": "/v", "time": "/t", "unit": "mm"} for n in ("a", "b")],
     )
-    with listening(broker, device, both) as (_, latest):
+    clock = SteppedClock()
+    with listening(broker, device, both, clock=clock) as (_, latest):
         device.publish("a", payload(1.0))
         assert latest.wait_for("g.a", OK).value == 1.0
         device.publish("b", payload(2.0))
         assert latest.wait_for("g.b", OK).value == 2.0
         since = latest.now
         while not any(n == "g.a" and r.quality is Quality.TIMEOUT for n, r in latest.history[since:]):
+            clock.step(STALE_AFTER_S / 4)
             published = latest.now
             device.publish("b", payload(2.0))
             latest.wait_for_any("g.b", published)
@@ -249,13 +273,13 @@ def test_channels_out_of_one_document(broker: Broker, device: Publisher) -> None
 
 def good_then(device: Publisher, latest: Any) -> int:
     """Deliver a good value; what comes after the returned history entry is new."""
-    device.publish("a", payload(1.5))
+    device.publish("a", payload(1.5), retain=True)  # for a line that is just being opened anew, too
     latest.wait_for("g.a", OK)
     return int(latest.now)
 
 
 def test_a_broker_that_is_killed_is_a_lost_line_until_it_is_back(broker: Broker, device: Publisher) -> None:
-    with listening(broker, device, timed(), stale_after_s=30.0) as (acquisition, latest):
+    with listening(broker, device, timed()) as (acquisition, latest):
         since = good_then(device, latest)
         broker.kill()
         assert math.isnan(latest.wait_for("g.a", Quality.LINE_LOST, since).value)
@@ -272,7 +296,7 @@ def test_what_a_broker_had_kept_is_not_now_when_it_is_back(tmp_path: Path) -> No
     with (
         running_broker(tmp_path, keeps) as broker,
         publisher(broker) as device,
-        listening(broker, device, plain(), stale_after_s=60.0) as (acquisition, latest),
+        listening(broker, device, plain()) as (acquisition, latest),
     ):
         since = latest.now
         device.publish("a", "1.5", retain=True)
@@ -291,7 +315,7 @@ def test_what_a_broker_had_kept_is_not_now_when_it_is_back(tmp_path: Path) -> No
 
 
 def test_a_broker_that_stands_still_is_lost(broker: Broker, device: Publisher) -> None:
-    with listening(broker, device, timed()) as (_, latest):
+    with listening(broker, device, timed(), {"keep_alive_s": 1}) as (_, latest):
         since = good_then(device, latest)
         broker.pause()
         assert "Keep alive" in latest.wait_for("g.a", Quality.LINE_LOST, since).detail
@@ -301,16 +325,21 @@ def test_a_broker_that_stands_still_is_lost(broker: Broker, device: Publisher) -
 def test_one_damaged_length_is_not_believed_and_two_that_agree_are(broker: Broker, device: Publisher) -> None:
     memory = TrustMemory(["g.a"], [0.001])
     judge = ReadingTrust(memory, "g.a", TrustSettings(MotionLimits(acceleration=1.0), False, 30.0, restart_s=0.5))
-    with listening(broker, device, timed(), trust={"g.a": judge}, stale_after_s=30.0) as (_, latest):
-        # measured 0.1 s apart, however fast they are sent: of a part whose speed is known
+    with listening(broker, device, timed(), trust={"g.a": judge}) as (_, latest):
+        now_utc_s = time.time()
+
+        def publish(value: float, age_s: float) -> None:
+            """Measured so long before one moment, whenever it is sent: of a part whose speed is known."""
+            device.publish("a", payload(value, age_s, now_utc_s))
+
         for age_s in (0.8, 0.7, 0.6):
-            device.publish("a", payload(1.0, age_s))
+            publish(1.0, age_s)
         latest.wait_for("g.a", OK)
-        device.publish("a", payload(5.0, 0.5))  # damaged on its way: nobody can ask again
-        device.publish("a", payload(1.0001, 0.4))
-        device.publish("a", payload(1.0002, 0.3))
+        publish(5.0, 0.5)  # damaged on its way: nobody can ask again
+        publish(1.0001, 0.4)
+        publish(1.0002, 0.3)
         latest.wait_for_value("g.a", 1.0002)
         assert 5.0 not in {r.value for _, r in latest.history}
-        device.publish("a", payload(5.0, 0.2))
-        device.publish("a", payload(5.0, 0.1))
+        publish(5.0, 0.2)
+        publish(5.0, 0.1)
         assert "jumped by 4.000 mm" in latest.wait_for("g.a", Quality.DISTRUSTED).detail

@@ -12,13 +12,16 @@ from typing import Any
 import pytest
 from asyncua import ua
 
+from compd.clock import Clock
 from compd.gauge import Gauge, Quality
+from compd.source_time import SAME_TIME_S
+from tests.support.hand_clock import SteppedClock
 from tests.support.opc_ua_server import NAMESPACE, OneUser, OpcUaServer, running_server
 from tests.support.pushed_gauges import STALE_AFTER_S, acquiring, gauge
 
 OK = Quality.OK
-# A value that is written before the line is back must not be too old by then, on a busy computer either.
-SLOW_RETURN_S = 30.0
+# Of a line that is not lost when the clock is put forward.
+PATIENT_LINE_S = 4 * STALE_AFTER_S
 # Part 4, 7.39: the low half says something of a value; at its high limit.
 OF_A_VALUE, AT_HIGH = 0x0400, 0x0200
 
@@ -41,25 +44,26 @@ def probe(node: str = "ns=2;s=a", time_from: str = "source", **keys: Any) -> Gau
 def listening(
     server: OpcUaServer,
     measured: Gauge[Any],
-    stale_after_s: float = STALE_AFTER_S,
     node: str = "a",
     first: tuple[Any, ua.VariantType | None] = (0.0, None),
+    clock: Clock | None = None,
     **keys: Any,
 ) -> Iterator[tuple[Any, Any]]:
     """The line's thread with one gauge, subscribed: it has heard what the server had before, which is too old."""
     server.write(node, *first, age_s=3600)
-    with acquiring(line_to(server, **keys), {"g": measured}, stale_after_s=stale_after_s) as (acquisition, latest):
+    with acquiring(line_to(server, **keys), {"g": measured}, clock=clock) as (acquisition, latest):
         latest.wait_for_any("g.a")
         yield acquisition, latest
 
 
 def test_a_number_is_read_in_its_unit_with_the_time_of_its_source(server: OpcUaServer) -> None:
-    with listening(server, probe(unit="um"), stale_after_s=30.0) as (_, latest):
-        since, now_s = latest.now, time.monotonic()
-        server.write("a", 12.5, age_s=0.2)
+    with listening(server, probe(unit="um")) as (_, latest):
+        since, before_s, age_s = latest.now, time.monotonic(), STALE_AFTER_S / 2
+        server.write("a", 12.5, age_s=age_s)
         reading = latest.wait_for("g.a", OK, since)
         assert reading.value == pytest.approx(0.0125)
-        assert reading.time_s == pytest.approx(now_s - 0.2, abs=0.1)
+        # older where the line's thread is held up between two looks at its clocks
+        assert before_s - STALE_AFTER_S < reading.time_s <= time.monotonic() - age_s + SAME_TIME_S
 
 
 @pytest.mark.parametrize("kind", ["Float", "Int16", "UInt64", "Byte"])
@@ -138,12 +142,14 @@ def test_an_old_value_is_stale_and_a_future_one_has_the_time_of_its_request(serv
 
 
 def test_a_value_that_is_written_again_is_new_and_one_that_is_not_grows_stale(server: OpcUaServer) -> None:
-    with listening(server, probe()) as (acquisition, latest):
+    clock = SteppedClock()
+    with listening(server, probe(), clock=clock, timeout_s=PATIENT_LINE_S) as (acquisition, latest):
         server.write("a", 1.5)
         latest.wait_for("g.a", OK)
         since = latest.now
         server.write("a", 1.5)
         latest.wait_for("g.a", OK, since)
+        clock.step(1.01 * STALE_AFTER_S)
         reading = latest.wait_for("g.a", Quality.TIMEOUT)  # its writer has died; keep-alives go on
         assert "`unchanged: holds`" in reading.detail
         assert acquisition.status()["l"]["state"] == "open"
@@ -151,12 +157,15 @@ def test_a_value_that_is_written_again_is_new_and_one_that_is_not_grows_stale(se
 
 def test_a_value_that_stands_still_is_confirmed_where_the_server_sends_only_changes(server: OpcUaServer) -> None:
     server.write("a", 1.5, age_s=3600)
-    with acquiring(line_to(server, unchanged="holds"), {"g": probe()}) as (_, latest):
+    clock = SteppedClock()
+    line = line_to(server, unchanged="holds", timeout_s=PATIENT_LINE_S)
+    with acquiring(line, {"g": probe()}, clock=clock) as (_, latest):
         first = latest.wait_for("g.a", OK)
         later_s = first.time_s + 2 * STALE_AFTER_S
         while (reading := latest.wait_for("g.a", OK, latest.now)).time_s < later_s:
             assert reading.value == 1.5
-            assert reading.time_s <= time.monotonic()
+            assert reading.time_s <= clock.monotonic()
+            clock.step(STALE_AFTER_S / 4)
         assert {r.quality for _, r in latest.history} == {OK}
         server.write("a", 1.5, status=ua.StatusCodes.BadSensorFailure)
         latest.wait_for("g.a", Quality.SENSOR_FAULT)
@@ -173,7 +182,7 @@ def test_by_arrival_the_time_is_that_of_the_request(server: OpcUaServer) -> None
 
 
 def test_out_of_order_values_change_nothing(server: OpcUaServer) -> None:
-    with listening(server, probe(), stale_after_s=30.0) as (acquisition, latest):
+    with listening(server, probe()) as (acquisition, latest):
         server.write("a", 1.5, age_s=0.05)
         latest.wait_for_value("g.a", 1.5)
         server.write("b", 0.0)
@@ -195,7 +204,7 @@ def test_a_node_that_is_missing_is_named_and_the_others_go_on(server: OpcUaServe
         "i": probe("nsu=http://nobody/;s=a"),
         "j": probe("i=99999999999"),
     }
-    with acquiring(line_to(server), gauges, stale_after_s=30.0) as (_, latest):
+    with acquiring(line_to(server), gauges) as (_, latest):
         assert latest.wait_for("g.a", OK).value == 1.5
         assert "BadNodeIdUnknown" in latest.wait_for("h.a", Quality.DEVICE_ERROR).detail
         assert "no namespace http://nobody/" in latest.wait_for("i.a", Quality.DEVICE_ERROR).detail
@@ -203,7 +212,7 @@ def test_a_node_that_is_missing_is_named_and_the_others_go_on(server: OpcUaServe
 
 
 def test_a_node_that_comes_later_is_read(server: OpcUaServer) -> None:
-    with acquiring(line_to(server), {"g": probe("ns=2;s=later")}, stale_after_s=30.0) as (_, latest):
+    with acquiring(line_to(server), {"g": probe("ns=2;s=later")}) as (_, latest):
         latest.wait_for("g.a", Quality.DEVICE_ERROR)
         server.write("later", 1.5)
         assert latest.wait_for("g.a", OK).value == 1.5
@@ -211,12 +220,12 @@ def test_a_node_that_comes_later_is_read(server: OpcUaServer) -> None:
 
 def test_a_node_by_the_name_of_its_namespace(server: OpcUaServer) -> None:
     server.write("a", 1.5)
-    with acquiring(line_to(server), {"g": probe(f"nsu={NAMESPACE};s=a")}, stale_after_s=30.0) as (_, latest):
+    with acquiring(line_to(server), {"g": probe(f"nsu={NAMESPACE};s=a")}) as (_, latest):
         assert latest.wait_for("g.a", OK).value == 1.5
 
 
 def test_a_server_that_is_restarted_is_a_lost_line_until_it_is_back(server: OpcUaServer) -> None:
-    with listening(server, probe(), stale_after_s=SLOW_RETURN_S) as (acquisition, latest):
+    with listening(server, probe()) as (acquisition, latest):
         server.write("a", 1.5)
         latest.wait_for("g.a", OK)
         since = latest.now
@@ -230,7 +239,7 @@ def test_a_server_that_is_restarted_is_a_lost_line_until_it_is_back(server: OpcU
 
 
 def test_a_server_that_stands_still_is_lost_though_its_connection_is_open(server: OpcUaServer) -> None:
-    with listening(server, probe(), stale_after_s=SLOW_RETURN_S, timeout_s=1.0) as (_, latest):
+    with listening(server, probe(), timeout_s=1.0) as (_, latest):
         server.write("a", 1.5)
         latest.wait_for("g.a", OK)
         since = latest.now
@@ -252,7 +261,7 @@ def test_user_and_password_out_of_a_file(tmp_path: Path) -> None:
         guarded.write("a", 1.5)
         with acquiring(line_to(guarded), {"g": probe()}) as (_, latest):
             assert "refuses: Bad" in latest.wait_for("g.a", Quality.LINE_LOST).detail
-        with acquiring(line_to(guarded, **login), {"g": probe()}, stale_after_s=30.0) as (_, latest):
+        with acquiring(line_to(guarded, **login), {"g": probe()}) as (_, latest):
             assert latest.wait_for("g.a", OK).value == 1.5
         with acquiring(line_to(guarded, **{**login, "password_file": "/nowhere"}), {"g": probe()}) as (_, latest):
             assert "No such file" in latest.wait_for("g.a", Quality.LINE_LOST).detail

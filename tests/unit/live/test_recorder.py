@@ -16,10 +16,10 @@ from compd.live.record.replay import RecordedCycles, replay_cycles
 from compd.live.system import THIS_COMPUTER, System
 from compd.recording import read_recording
 from tests.support.live_machine import Machine, machine
+from tests.support.patience import PATIENCE_S
 from tests.support.recorded_run import ROOMY, Run, rows_of
 from tests.support.small_disk import room_for
 
-TIMEOUT_S = 60
 A_PICOMETRE_MM = 1e-9
 
 
@@ -267,7 +267,7 @@ class Wakes(System):
     def wait(self, event, timeout_s):
         self.timeouts_s.append(timeout_s)
         self.waits.release()
-        assert self.go.acquire(timeout=TIMEOUT_S)
+        assert self.go.acquire(timeout=PATIENCE_S)
         return event.is_set()
 
 
@@ -275,12 +275,12 @@ def test_what_came_is_on_disk_at_every_wake_and_it_wakes_more_than_once_a_second
     run, clock = Run(machine()), Wakes()
     recorder = Recorder(tmp_path / "run", run.version, run.watch, ROOMY, lambda _: None, clock)
     recorder.start()
-    assert clock.waits.acquire(timeout=TIMEOUT_S)
+    assert clock.waits.acquire(timeout=PATIENCE_S)
     for rows in (5, 10, 15):
         for line, message, _ in run.quiet(5):
             recorder.put(line, message)
         clock.go.release()
-        assert clock.waits.acquire(timeout=TIMEOUT_S), "written, and waiting again"
+        assert clock.waits.acquire(timeout=PATIENCE_S), "written, and waiting again"
         assert len(rows_of(tmp_path / "run-0001.csv")) == rows
         assert len((tmp_path / "run-0001.cycles.jsonl").read_bytes().splitlines()) == 2 + rows
     clock.go.release()

@@ -21,8 +21,9 @@ from compd.lines import Ports
 from compd.live.acquisition.acquisition import LineThread
 from compd.live.system import System
 from compd.plugins import GAUGES, load
+from tests.support.patience import PATIENCE_S
 from tests.support.sampled import sampled
-from tests.support.wire_rig import PATIENCE_S, SETTINGS, WatchedLatest
+from tests.support.wire_rig import SETTINGS, WatchedLatest
 
 UNITS = 9
 ANSWER_S = 60e-3

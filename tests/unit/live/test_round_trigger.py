@@ -21,12 +21,13 @@ from compd.live.acquisition.reading_trust import ReadingTrust, TrustSettings
 from compd.live.acquisition.round_trigger import read_latched
 from compd.live.memory.trust_memory import TrustMemory
 from compd.live.system import THIS_COMPUTER
-from tests.support.wire_rig import PATIENCE_S, SETTINGS, InstantClock, Rig, ScriptedPort, WatchedLatest, rig
+from tests.support.patience import PATIENCE_S
+from tests.support.wire_rig import SETTINGS, InstantClock, Rig, ScriptedPort, WatchedLatest, rig
 
 OK = Quality.OK
 UNITS = range(1, 10)
-ASCII_LINE = {"kind": "serial", "port": "/dev/x", "baud": 115200, "format": "8N1", "timeout_s": 0.5}
-RTU_LINE = {"kind": "modbus_rtu", "port": "/dev/x", "baud": 115200, "format": "8N1", "timeout_s": 0.5}
+ASCII_LINE = {"kind": "serial", "port": "/dev/x", "baud": 115200, "format": "8N1", "timeout_s": PATIENCE_S}
+RTU_LINE = {"kind": "modbus_rtu", "port": "/dev/x", "baud": 115200, "format": "8N1", "timeout_s": PATIENCE_S}
 
 
 def ascii_gauge(unit: int) -> dict[str, Any]:
@@ -46,7 +47,7 @@ LINES = {
             "kind": "tcp",
             "host": "x",
             "port": 1,
-            "timeout_s": 0.5,
+            "timeout_s": PATIENCE_S,
             "round_trigger": {"out": "TRG", "out_terminator": "\r"},
         },
         ascii_gauge,
@@ -70,7 +71,7 @@ LINES = {
         modbus_gauge,
     ),
     "Modbus TCP": (
-        {"kind": "modbus_tcp", "host": "x", "port": 1, "timeout_s": 0.5}
+        {"kind": "modbus_tcp", "host": "x", "port": 1, "timeout_s": PATIENCE_S}
         | {"round_trigger": {"function": 5, "address": 7, "values": [1], "unit": 1}},
         modbus_gauge,
     ),
@@ -103,6 +104,11 @@ def rounds(latest: WatchedLatest) -> list[list[Reading]]:
     good_ones = [(name, reading) for name, reading in list(latest.history) if reading.ok]
     starts = [k for k, (name, _) in enumerate(good_ones) if name == latest.channels[0]]
     return [[reading for _, reading in good_ones[a:b]] for a, b in itertools.pairwise(starts)]
+
+
+def values_by_time(latest: WatchedLatest, channel: str) -> dict[float, float]:
+    """Of the channel's good readings so far."""
+    return {reading.time_s: reading.value for name, reading in latest.history if name == channel and reading.ok}
 
 
 @pytest.mark.parametrize("name", LINES)
@@ -148,14 +154,12 @@ def test_the_others_keep_the_trigger_s_time_when_a_gauge_is_missing(tmp_path: Pa
         device_rig.gauges["g2"] = type(driver)(options)  # no such device on the wire
         with acquiring(device_rig) as (_, latest):
             latest.wait_for("g2.v", Quality.TIMEOUT)
-            for _ in range(3):
+            shared: list[float] = []
+            while len(shared) < 3:
                 latest.wait_for("g3.v", OK, latest.now)
-    pairs = [(r.time_s, r.value) for name, r in latest.history if name == "g1.v" and r.ok]
-    assert pairs
-    third = {r.time_s: r.value for name, r in latest.history if name == "g3.v" and r.ok}
-    shared = [time_s for time_s, _ in pairs if time_s in third]
-    assert len(shared) >= 3
-    assert all(dict(pairs)[time_s] == third[time_s] for time_s in shared[1:])
+                first, third = (values_by_time(latest, channel) for channel in ("g1.v", "g3.v"))
+                shared = sorted(first.keys() & third.keys())
+    assert all(first[time_s] == third[time_s] for time_s in shared[1:])
 
 
 def test_a_single_gauge_is_latched_before_it_is_read(tmp_path: Path) -> None:

@@ -12,6 +12,7 @@ from compd.page.recordings import Recordings
 from compd.page.server import Server
 from tests.support.asgi_client import AsgiClient
 from tests.support.hand_clock import HandClock
+from tests.support.patience import PATIENCE_S
 from tests.support.scripted_page import ORDERS, ScriptedLink
 
 HOST = "127.0.0.1:7760"
@@ -34,7 +35,7 @@ def run(server, conversation):
         app = server.app()
         guarded = Guard(app, [Token("Anna", ORDERS, hashed("anna's"))], [f"http://{HOST}"], 7760)
         headers = {"Host": HOST, "Origin": f"http://{HOST}", "Cookie": f"{COOKIE}7760=anna's"}
-        async with asyncio.timeout(30.0), app.router.lifespan_context(app):
+        async with asyncio.timeout(PATIENCE_S), app.router.lifespan_context(app):
             await conversation(AsgiClient(guarded, headers))
 
     asyncio.run(all_of_it())

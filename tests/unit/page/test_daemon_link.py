@@ -8,6 +8,7 @@ import json
 import pytest
 
 from compd.page.daemon_link import DaemonLink
+from tests.support.patience import PATIENCE_S
 
 VERSION = {"class": "VERSION"}
 
@@ -40,7 +41,7 @@ def test_the_reason_is_told_and_the_link_goes_on(tmp_path, lines, reason):
     async def conversation():
         path = str(tmp_path / "s")
         link = DaemonLink(path)
-        async with asyncio.timeout(20.0), await asyncio.start_unix_server(talk, path):
+        async with asyncio.timeout(PATIENCE_S), await asyncio.start_unix_server(talk, path):
             running = asyncio.create_task(link.run())
             async with link.news:
                 for _ in range(2):

@@ -20,8 +20,8 @@ from compd.page.guard import Token, hashed
 from compd.page.limited_protocol import LimitedProtocol
 from compd.page.run import limited_config
 from tests.support.event_stream import connected, request
+from tests.support.patience import PATIENCE_S
 
-PATIENCE_S = 60.0
 LARGE = PIECE_BYTES * 200
 
 

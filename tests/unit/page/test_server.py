@@ -16,6 +16,7 @@ from compd.page.history import History
 from compd.page.recordings import Recordings
 from compd.page.requests import MAX_BODY_BYTES
 from compd.page.server import AXES_CSS, STATIC, Server, _ended, packed
+from tests.support.patience import PATIENCE_S
 
 HOST = "127.0.0.1:7760"
 # What a browser loads before it shows the live page, without compression: 1.2 s at 1 Mbit/s.
@@ -136,14 +137,14 @@ def test_the_history_can_be_read_back():
 def test_a_task_that_has_missed_a_cancellation_ends_too():
     async def deaf():
         try:
-            await asyncio.sleep(60.0)
+            await asyncio.Event().wait()
         except asyncio.CancelledError:
-            await asyncio.sleep(60.0)
+            await asyncio.Event().wait()
 
     async def both():
-        tasks = [asyncio.create_task(deaf()), asyncio.create_task(asyncio.sleep(60.0))]
+        tasks = [asyncio.create_task(deaf()), asyncio.create_task(asyncio.Event().wait())]
         await asyncio.sleep(0)
-        await asyncio.wait_for(_ended(tasks), 10.0)
+        await asyncio.wait_for(_ended(tasks), PATIENCE_S)
         assert all(task.done() for task in tasks)
 
     asyncio.run(both())

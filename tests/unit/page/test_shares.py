@@ -13,7 +13,8 @@ from compd.page.shares import ASKER, Places
 from compd.page.workbench.routes import MAX_OPEN
 from compd.page.workers.limits import WorkerLimits
 from compd.page.workers.workers import Workers
-from tests.unit.page.workers.test_worker import COUNTER, PATIENCE_S, ask
+from tests.support.patience import PATIENCE_S
+from tests.unit.page.workers.test_worker import COUNTER, ask
 
 
 def token(name, role="view"):

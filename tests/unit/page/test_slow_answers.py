@@ -17,7 +17,7 @@ from compd.page.limited_protocol import EVENTS_BUFFER_BYTES, HEAD_WITHIN_S, Limi
 from compd.page.run import limited_config
 from tests.support.event_stream import connected
 
-pytestmark = [pytest.mark.timeout(60), pytest.mark.long, pytest.mark.sample]
+pytestmark = [pytest.mark.long, pytest.mark.sample]
 
 LARGE = bytes(24 * 2**20)
 REQUEST = b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n"

@@ -17,6 +17,7 @@ from compd.simulation.truth.world import World
 from compd.simulation.wires.control import MAX_REQUEST, Answer, ControlSocket
 from compd.simulation.wires.daemon_configuration import Port, daemon_configuration
 from compd.simulation.wires.server import Sensing
+from tests.support.patience import PATIENCE_S
 from tests.support.simulated import HEXAPOD, TRIPOD, ask, run_directory, section
 
 SHIPPED = pytest.mark.parametrize("path", [TRIPOD, HEXAPOD], ids=["tripod", "hexapod"])
@@ -39,7 +40,7 @@ def client(directory: Path) -> Iterator[socket.socket]:
     }
     control = ControlSocket(directory / "control.sock", handlers)
     with socket.socket(socket.AF_UNIX) as connection:
-        connection.settimeout(10.0)
+        connection.settimeout(PATIENCE_S)
         connection.connect(str(directory / "control.sock"))
         yield connection
     control.stop()

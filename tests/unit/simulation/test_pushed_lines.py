@@ -21,9 +21,11 @@ from compd.lines.kinds.opc_ua.twin import OpcUaNodes
 from compd.plugins import SIMULATED_GAUGES, load
 from compd.twins import SimulatedPushedLine
 from tests.support.mosquitto import needs_mosquitto, running_broker
-from tests.support.pushed_gauges import STALE_AFTER_S, acquiring, gauge
+from tests.support.pushed_gauges import acquiring, gauge
 from tests.support.sampled import sampled
 
+# A twin publishes time and again: what is too old by the time it comes is followed by what is not.
+STALE_AFTER_S = 0.5
 VALUES = {"a": 1.25, "b": -0.5, "off": math.nan}
 NODES = [
     {"name": "a", "node": "nsu=urn:probes;s=a", "unit": "um", "scale": 0.5},
@@ -146,14 +148,13 @@ def check_fault(
     twin: SimulatedPushedLine, line: dict[str, Any], measured: Any, fault: str, qualities: set[Quality], channel: str
 ) -> None:
     """With the fault the channel gets one of these qualities and no value that is not of now; then it is good again."""
-    with acquiring(line, {"g": measured}) as (_, latest):
+    with acquiring(line, {"g": measured}, stale_after_s=STALE_AFTER_S) as (_, latest):
         latest.wait_for(channel, Quality.OK)
         twin.fault = fault
         first = next(r for r in iter(lambda: latest.wait_for_any(channel, latest.now), None) if r.quality in qualities)
         assert math.isnan(first.value)
-        ends = latest.now
+        begun_s, ends = MonotonicClock().monotonic(), latest.now
         twin.fault = None
-        begun_s = MonotonicClock().monotonic()
         good = latest.wait_for(channel, Quality.OK, ends)
         assert good.time_s > begun_s - STALE_AFTER_S, "an old value counts as a new one"
         values = [r.value for name, r in latest.history if name == channel and r.ok]

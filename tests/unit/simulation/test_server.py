@@ -24,9 +24,9 @@ from compd.simulation.causes.hidden_cause import draw_hidden
 from compd.simulation.truth.mechanism import Mechanism
 from compd.simulation.truth.world import World
 from compd.simulation.wires.server import STEP_S, Simulation
+from tests.support.patience import PATIENCE_S
 from tests.support.simulated import HEXAPOD, TRIPOD, ask, run_directory
 
-MAX_WAIT_S = 20.0
 HEAT = {"drives_W": [0.0] * 3, "ring_W": 0.0, "cabinet_W": [0.0] * 3, "platform_W": 0.0, "tool_W": 0.0, "lamps_W": 0.0}
 
 
@@ -53,11 +53,11 @@ class TurnedClock:
     def turn(self, time_s: float) -> None:
         """Only with somebody waiting, and for at least what they wait for."""
         with self._changed:
-            assert self._changed.wait_for(lambda: self._waits > 0, MAX_WAIT_S)
+            assert self._changed.wait_for(lambda: self._waits > 0, PATIENCE_S)
             waits = self._waits
             self._now_s += time_s
             self._changed.notify_all()
-            assert self._changed.wait_for(lambda: self._waits > waits, MAX_WAIT_S)
+            assert self._changed.wait_for(lambda: self._waits > waits, PATIENCE_S)
 
 
 class Running:
@@ -70,16 +70,17 @@ class Running:
         self.simulation = Simulation(self.configuration, world, directory, self.clock)
         self.daemon: Configuration = self.simulation.start()
         self.control = socket.socket(socket.AF_UNIX)
-        self.control.settimeout(MAX_WAIT_S)
+        self.control.settimeout(PATIENCE_S)
         self.control.connect(str(directory / "control.sock"))
 
     def stop(self) -> None:
         self.control.close()
         self.simulation.stop()
 
-    def read(self, gauge: str) -> dict[str, Reading]:
+    def read(self, gauge: str, timeout_s: float = PATIENCE_S) -> dict[str, Reading]:
         """By the product's own driver, over the port that the daemon's configuration names."""
-        line = open_line(self.daemon.lines[self.daemon.gauges[gauge].line], MonotonicClock())
+        settings = self.daemon.lines[self.daemon.gauges[gauge].line].model_copy(update={"timeout_s": timeout_s})
+        line = open_line(settings, MonotonicClock())
         try:
             driver = self.daemon.gauge_objects()[gauge]
             readings = driver.read(line)
@@ -225,7 +226,7 @@ def test_a_line_breaks_and_mends_on_request(start: Callable[[Path], Running]) ->
     running = start(TRIPOD)
     ask(running.control, {"class": "FAULT", "line": "joints", "fault": "silent"})
     with pytest.raises(LineFault) as silent:
-        running.read("joints")
+        running.read("joints", timeout_s=0.1)
     assert silent.value.quality is Quality.TIMEOUT
     assert all(reading.ok for reading in running.read("frame_u").values())
     ask(running.control, {"class": "FAULT", "line": "joints", "fault": None})
@@ -256,7 +257,7 @@ def test_the_command_serves_until_it_is_stopped() -> None:
                 control.connect(str(directory / "control.sock"))
                 assert ask(control, {"class": "TRUTH"})["mode"] == "zero"
             process.send_signal(signal.SIGTERM)
-            assert process.wait(MAX_WAIT_S) == 0
+            assert process.wait(PATIENCE_S) == 0
         assert f"compd run {directory / TRIPOD.name}" in printed
         assert all(name in printed for name in load(TRIPOD).lines)
         assert list(directory.iterdir()) == []
@@ -296,7 +297,7 @@ def test_the_machines_own_directory_is_refused_and_left_alone() -> None:
             capture_output=True,
             text=True,
             check=False,
-            timeout=60,
+            timeout=PATIENCE_S,
         )
         assert finished.returncode == 2
         assert "overwrite" in finished.stderr

@@ -14,6 +14,7 @@ import pytest
 
 from compd.errors import CompdError
 from compd.simulation.wires.simulation_directory import WRITTEN_BY, SimulationDirectory
+from tests.support.patience import PATIENCE_S
 from tests.support.sampled import sampled
 from tests.support.simulated import TRIPOD, run_directory
 
@@ -115,5 +116,5 @@ def test_the_command_leaves_nothing_however_it_is_ended(directory: Path, end: si
         assert any("Ctrl-C ends" in line for line in process.stdout)
         assert (directory / NAME).exists()
         process.send_signal(end)
-        assert process.wait(60) == 0
+        assert process.wait(PATIENCE_S) == 0
     assert list(directory.iterdir()) == []

@@ -9,6 +9,7 @@ import sys
 import pytest
 
 from tests.support.paths import ROOT
+from tests.support.patience import PATIENCE_S
 
 CONFTEST = """
 from contextlib import nullcontext
@@ -63,10 +64,10 @@ def test_fails_in_every_pause(paused):
 def test_only_in_a_pause_and_four_times_at_most(tmp_path):
     (tmp_path / "conftest.py").write_text(CONFTEST)
     (tmp_path / "test_gauges.py").write_text(TESTS)
-    command = [sys.executable, "-m", "pytest", "-p", "no:cacheprovider", "-o", "timeout=30", "-v", str(tmp_path)]
+    command = [sys.executable, "-m", "pytest", "-p", "no:cacheprovider", "-o", "timeout=100", "-v", str(tmp_path)]
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
     ran = subprocess.run(
-        command, cwd=tmp_path, env=environment, capture_output=True, text=True, check=False, timeout=60
+        command, cwd=tmp_path, env=environment, capture_output=True, text=True, check=False, timeout=PATIENCE_S
     )
     said = ran.stdout
     assert "test_fails_once_in_a_pause PAUSED" in said, said + ran.stderr

@@ -5,16 +5,20 @@ from __future__ import annotations
 import os
 import threading
 import tty
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
 
 from compd.errors import CompdError
+from compd.gauge_description import capture as capture_module
 from compd.gauge_description import capture_live, read_capture, saved_capture
 from compd.gauge_description.capture import CapturedReply
 from compd.lines.kinds.serial.settings import SerialLine
+from compd.lines.stream import StreamLine
+from tests.support.wire_rig import InstantClock
+from tests.unit.drivers.test_unasked import TalkingPort
 
 
 @contextmanager
@@ -40,30 +44,51 @@ def talker(period_s: float, end: bytes = b"\r\n") -> Iterator[str]:
     os.close(slave)
 
 
-def capture(port: str, timeout_s: float, wanted: int = 4) -> list[CapturedReply]:
-    settings = SerialLine(kind="serial", port=port, baud=9600, format="8N1", timeout_s=timeout_s)
-    return capture_live(settings, "", wanted, lambda done, all_of_them: None, lambda text: None)
+class Talker(TalkingPort):
+    """A device that says +0001.001, +0002.002 ... in virtual time, byte by byte."""
+
+    def __init__(self, clock: InstantClock, period_s: float, end: bytes) -> None:
+        super().__init__(clock, period_s)
+        self._line_end = end
+
+    def line(self, number: int) -> bytes:
+        return b"+000%d.%03d" % (number % 10, number % 1000) + self._line_end
+
+
+@pytest.fixture
+def capture(monkeypatch: pytest.MonkeyPatch) -> Callable[..., list[CapturedReply]]:
+    """Capture the lines of a device that says one every `period_s`."""
+
+    def captured(period_s: float, timeout_s: float, wanted: int = 4, end: bytes = b"\r\n") -> list[CapturedReply]:
+        clock = InstantClock()
+        line = StreamLine(Talker(clock, period_s, end), timeout_s, 0.002, clock)
+        monkeypatch.setattr(capture_module, "open_tapped_stream", lambda *_: line)
+        settings = SerialLine(kind="serial", port="/dev/x", baud=9600, format="8N1", timeout_s=timeout_s)
+        return capture_live(settings, "", wanted, lambda done, all_of_them: None, lambda text: None)
+
+    return captured
 
 
 @pytest.mark.parametrize("end", [b"\r\n", b"\r", b"\n", b"\x03"])
 @pytest.mark.parametrize("timeout_s", [0.03, 1.0])
-def test_a_device_that_sends_unsolicited_is_captured_line_by_line(end: bytes, timeout_s: float) -> None:
+def test_a_device_that_sends_unsolicited_is_captured_line_by_line(
+    capture: Callable[..., list[CapturedReply]], end: bytes, timeout_s: float
+) -> None:
     """50 Hz: there is no silence, whatever the timeout."""
-    with talker(0.02, end) as port:
-        captured = capture(port, timeout_s)
+    captured = capture(0.02, timeout_s, end=end)
     assert all(request == b"" and len(reply) == 9 + len(end) and reply.endswith(end) for request, reply in captured)
     assert len({reply for _, reply in captured}) == 4
 
 
-def test_one_whose_period_is_longer_than_the_timeout_of_a_silence() -> None:
-    with talker(0.2) as port:
-        captured = capture(port, 0.15, wanted=3)
-    assert all(len(reply) == 11 for _, reply in captured)
+def test_one_whose_period_is_longer_than_the_timeout_of_a_silence(
+    capture: Callable[..., list[CapturedReply]],
+) -> None:
+    assert all(len(reply) == 11 for _, reply in capture(0.2, 0.15, wanted=3))
 
 
-def test_a_period_that_is_too_long_is_named() -> None:
-    with talker(60.0) as port, pytest.raises(CompdError, match="--timeout longer than the period") as caught:
-        capture(port, 0.02)
+def test_a_period_that_is_too_long_is_named(capture: Callable[..., list[CapturedReply]]) -> None:
+    with pytest.raises(CompdError, match="--timeout longer than the period") as caught:
+        capture(60.0, 0.02)
     assert "--out" in str(caught.value)
 
 

@@ -26,6 +26,7 @@ from compd.live.system.child_process import ChildProcess
 from compd.live.system.forked_process import OUT_OF_MEMORY
 from compd.live.system.realtime import RationedPriority, thread_time_s
 from compd.setpoint_states import Mode, State
+from tests.support.patience import PATIENCE_S
 
 
 @pytest.fixture
@@ -257,9 +258,10 @@ def test_the_processor_time_of_a_thread_is_its_own_until_it_has_ended():
 
     thread = threading.Thread(target=line)
     thread.start()
-    assert started.wait(20.0)
+    assert started.wait(PATIENCE_S)
     assert 0.0 < thread_time_s(thread.native_id) < time.process_time()
-    assert thread_time_s(threading.get_native_id()) == pytest.approx(time.thread_time(), abs=0.1)
+    before_s = time.thread_time()
+    assert before_s <= thread_time_s(threading.get_native_id()) <= time.thread_time()
     end.set()
     thread.join()
     with pytest.raises(OSError, match="Invalid argument"):

@@ -15,7 +15,8 @@ import structlog
 
 from compd.live.processes import log_relay
 from compd.live.processes.log_relay import BURST_LINES, LINES_PER_S, MAX_LINE_BYTES, READ_BYTES, LogRelay
-from tests.support.wire_rig import PATIENCE_S, InstantClock
+from tests.support.patience import PATIENCE_S
+from tests.support.wire_rig import InstantClock
 
 LARGE_PIPE = 1 << 20
 

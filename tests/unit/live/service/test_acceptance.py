@@ -10,6 +10,7 @@ import pytest
 from compd.live.memory.trust_memory import Doubt, TrustMemory
 from compd.live.service.acceptance import WATCHED_S, Acceptance
 from compd.live.system import System
+from tests.support.patience import PATIENCE_S
 
 CHANNELS = ("scale_1.position", "joints.1", "joints.2")
 
@@ -44,7 +45,7 @@ def trust():
 def accepted(trust, gauge, *acts):
     answers = queue.Queue()
     Acceptance(trust, AcquisitionClock(*acts)).start(gauge, answers.put)
-    return json.loads(answers.get(timeout=20))
+    return json.loads(answers.get(timeout=PATIENCE_S))
 
 
 def obeys(trust, i, at_s):

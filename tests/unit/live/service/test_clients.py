@@ -12,7 +12,8 @@ import pytest
 from compd.clock import MonotonicClock
 from compd.live.memory.shared_ring import ENTRIES
 from compd.live.service import connection_limits as seats
-from tests.support.service import PERIOD_S, TIMEOUT_S, setpoint
+from tests.support.patience import PATIENCE_S
+from tests.support.service import PERIOD_S, setpoint
 
 STATUS = b'{"class":"STATUS"}\n'
 
@@ -49,7 +50,7 @@ def test_a_client_waits_for_one_request_of_each_other_and_not_for_their_floods(s
     def status():
         if not answered:
             entered.set()
-            assert leave.wait(TIMEOUT_S)
+            assert leave.wait(PATIENCE_S)
         answered.append("STATUS")
         return {"class": "STATUS"}
 
@@ -57,7 +58,7 @@ def test_a_client_waits_for_one_request_of_each_other_and_not_for_their_floods(s
     context.messages = replace(context.messages, status=status)
     for flooder in others:
         flooder.send(STATUS * 150)
-    assert entered.wait(TIMEOUT_S)
+    assert entered.wait(PATIENCE_S)
     polite.send({"class": "VERSION"})
     leave.set()
     assert polite.read()["class"] == "VERSION"
@@ -139,11 +140,11 @@ def held_up(service):
 
     def hold_up(setpoint):
         entered.set()
-        assert leave.wait(TIMEOUT_S)
+        assert leave.wait(PATIENCE_S)
 
     service.publisher._observers = (hold_up,)
     service.deliver(setpoint(0, service.clock.monotonic()))
-    assert entered.wait(TIMEOUT_S)
+    assert entered.wait(PATIENCE_S)
     try:
         yield
     finally:

@@ -22,7 +22,8 @@ from compd.live.service.descriptor_bin import DescriptorBin
 from compd.live.service.messages import ProtocolError
 from compd.live.service.model_switch import ModelSwitch, ModelWish
 from compd.live.system import THIS_COMPUTER
-from tests.support.service import SteppedClock
+from tests.support.hand_clock import SteppedClock
+from tests.support.patience import PATIENCE_S
 
 TEXT = b"format: 1\n"
 
@@ -173,11 +174,11 @@ def test_where_closing_hangs_no_more_descriptors_are_taken(pair, file, monkeypat
 
 @pytest.fixture
 def lingering():
-    """Give away a TCP connection whose closing waits for 30 s: what was sent has not been read at its other end."""
+    """Give away a TCP connection whose closing waits for an hour: what was sent has not been read at its other end."""
     with socket.create_server(("127.0.0.1", 0)) as server:
         sender = socket.create_connection(server.getsockname())
         reader, _ = server.accept()
-        sender.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("2i", 1, 30))
+        sender.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("2i", 1, 3600))
         sender.setblocking(False)
         with contextlib.suppress(BlockingIOError):
             while True:
@@ -186,7 +187,6 @@ def lingering():
             yield sender.detach()
 
 
-@pytest.mark.timeout(15)
 @pytest.mark.parametrize("comes", ["first", "second", "when the client goes", "as a model"])
 def test_a_connection_that_lingers_is_waited_for_by_nobody(pair, switch, file, lingering, comes):
     if comes == "as a model":
@@ -221,7 +221,7 @@ class Switch:
 
     def read(self):
         """Until the file has been read: what the supervisor gets, or the refusal."""
-        assert self.woken.wait(20)
+        assert self.woken.wait(PATIENCE_S)
         self.woken.clear()
         self.switch.look()
         return self.answers[-1]["text"] if self.answers else self.control.model_request.read()
@@ -345,7 +345,7 @@ def test_a_file_system_that_hangs_stops_nobody(switch, file, monkeypatch):
     switch.switch.look()
     assert switch.answers[-1]["class"] == "MODEL"
     go_on.set()
-    assert switch.woken.wait(20)
+    assert switch.woken.wait(PATIENCE_S)
     switch.switch.look()
     assert len(switch.answers) == 2, "what comes too late counts no more"
 

@@ -3,11 +3,8 @@
 from __future__ import annotations
 
 import gzip
-import os
-import signal
 import subprocess
 import sys
-import time
 
 import pytest
 
@@ -15,10 +12,9 @@ from compd.diagnosis import STAGES
 from compd.errors import StateError
 from compd.page.workbench.diagnoses import MAX_RUNNING, Diagnoses
 from compd.page.workbench.diagnosis_job import DiagnosisJob
+from tests.support.daemon_process import Pidfds
 from tests.support.measured import gauges, hidden, record
-from tests.support.other_process import is_alive
-
-PATIENCE_S = 60.0
+from tests.support.patience import PATIENCE_S
 
 
 @pytest.fixture(scope="module")
@@ -92,12 +88,12 @@ def test_more_than_a_few_at_once_are_refused_and_there_is_room_after_an_end(path
 
 
 PARENT = """
-import multiprocessing, time
+import multiprocessing
 from compd.page.workers.workers import end_with_the_parent
 child = multiprocessing.get_context("spawn").Process(target=end_with_the_parent, daemon=True)
 child.start()
 print(child.pid, flush=True)
-time.sleep(60)
+child.join()
 """
 
 
@@ -105,13 +101,6 @@ def test_its_process_ends_when_the_server_is_killed():
     """Whatever it does just then: a stage may take minutes, in which it tells nobody anything."""
     with subprocess.Popen([sys.executable, "-c", PARENT], stdout=subprocess.PIPE, text=True) as parent:
         child = int(parent.stdout.readline())
-        try:
+        with Pidfds([child]) as ended:
             parent.kill()
-            parent.wait()
-            deadline_s = time.monotonic() + PATIENCE_S / 2
-            while is_alive(child) and time.monotonic() < deadline_s:
-                time.sleep(0.02)
-            assert not is_alive(child)
-        finally:
-            if is_alive(child):
-                os.kill(child, signal.SIGKILL)
+            ended.wait_for_ends()

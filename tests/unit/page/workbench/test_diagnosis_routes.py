@@ -13,11 +13,11 @@ from compd.page.recordings import Recordings
 from compd.page.server import Server
 from compd.page.workbench.diagnoses import MAX_RUNNING
 from tests.support.measured import gauges, hidden, record
+from tests.support.patience import PATIENCE_S
 
 HOST = "127.0.0.1:7760"
 OPEN = {"recording": "run", "model": "a.model.yaml"}
 BASE = "/workbench/run/a.model.yaml"
-PATIENCE_S = 60.0
 
 
 @pytest.fixture

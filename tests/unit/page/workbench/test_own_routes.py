@@ -15,6 +15,7 @@ from compd.page.recordings import Recordings
 from compd.page.server import Server
 from compd.page.workbench import routes
 from tests.support.measured import gauges, hidden, record
+from tests.support.patience import PATIENCE_S
 from tests.support.sampled import sampled
 
 HOST = "127.0.0.1:7760"
@@ -66,7 +67,7 @@ def test_what_cannot_be_opened_leaves_nothing_behind(client_of, directory):
     (directory / "plan.csv").unlink()
     for thread in workbench_threads():
         if thread not in before:
-            thread.join(60)
+            thread.join(PATIENCE_S)
     assert set(workbench_threads()) <= set(before)
 
 

@@ -20,12 +20,11 @@ from compd.page.workers.limits import WorkerLimits
 from compd.page.workers.worker_group import WorkerGroup
 from compd.page.workers.workers import Workers
 from tests.support.paths import ROOT
+from tests.support.patience import PATIENCE_S
 
 STATES = "tests.unit.page.workers.states"
 COUNTER = f"{STATES}:Counter"
 LIMITS = WorkerLimits(memory_mb=100, opening_s=60.0, idle_s=60.0)
-# For an answer that comes at once, on a busy computer.
-PATIENCE_S = 60.0
 
 
 @pytest.fixture
