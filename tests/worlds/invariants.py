@@ -6,6 +6,7 @@ Of each setpoint: `within_bound`, `steady_correction`, `true_reason`. Of a whole
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 
 import numpy as np
@@ -34,8 +35,8 @@ def within_bound(sight: Sight) -> str:
 
 
 def excused(sight: Sight) -> bool:
-    """Whether no data can show what is wrong: a fault of docs/reference/blind-spots.md. A program decides it, no name."""
-    return False
+    """Whether no data can show what is wrong: a fault of docs/reference/blind-spots.md, found by a program."""
+    return sight.setpoint.time_s - sight.setpoint.age_s <= sight.left_s < math.inf
 
 
 def steady_correction(sight: Sight) -> str:

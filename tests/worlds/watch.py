@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
@@ -52,11 +53,12 @@ class Watch:
         self._recent: list[Happening] = []
         self._suspects: set[str] = set()
         self._before: Setpoint | None = None
+        self._rested_s, self._left_s = self._began_s, math.inf
         self._faulty_since_s: float | None = None
         self.world.hearers.append(self.hear)
 
     def begins(self, happening: Happening) -> None:
-        """An event begins. Its gauges are under suspicion until a person has looked, all of them where it names none."""
+        """An event begins. Its gauges are suspects until a person has looked; all gauges where it names none."""
         self._recent.append(happening)
         self._recovery.begins(happening)
         if happening.is_fault:
@@ -82,9 +84,17 @@ class Watch:
         self.setpoints += 1
         self.digest.update(setpoint.line or setpoint.to_json())
         now_s = self.world.hub.now_s
+        self._left_s = min(self._left_s, self._rested_s) if told.moving else math.inf
+        self._rested_s = now_s if not told.moving else self._rested_s
         self._recent = [happening for happening in self._recent if happening.concerns(now_s)]
         sight = Sight(
-            self.world.configuration, setpoint, told, self._before, tuple(self._recent), frozenset(self._suspects)
+            self.world.configuration,
+            setpoint,
+            told,
+            self._before,
+            tuple(self._recent),
+            frozenset(self._suspects),
+            self._left_s,
         )
         self.coverage.count(sight.cases, told.valid, told.error_um, sight.bound_um)
         for name, invariant in invariants.OF_SETPOINTS.items():

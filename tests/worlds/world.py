@@ -34,6 +34,7 @@ from compd.plugins import load as load_plugin
 from compd.setpoint_states import State
 from compd.simulation import World as Truth
 from compd.simulation.truth.motion import DRIVES, Drives
+from compd.simulation.truth.strengths import Strengths
 from compd.simulation.wires.server import STEP_S, LiveWorld, Sensing
 from tests.worlds.hub import Hub
 from tests.worlds.wires import Wire, opened_virtually
@@ -276,8 +277,12 @@ def built(
     seed: int,
     drives: Drives = DRIVES,
     change: Callable[[dict[str, Any]], None] = lambda document: None,
+    strengths: Callable[[Configuration], Strengths | None] = lambda configuration: None,
 ) -> Iterator[World]:
-    """A world of a configuration, at machine zero, ready. `change`: of its document before it is loaded."""
+    """A world of a configuration, at machine zero, ready.
+
+    change : of its document before it is loaded. strengths : of the truth's error sources; ordinary ones for None.
+    """
     random.seed(seed)
     with ExitStack() as stack:
         directory = Path(tempfile.mkdtemp(prefix="compd-world-", dir="/dev/shm" if Path("/dev/shm").is_dir() else None))
@@ -290,7 +295,10 @@ def built(
         wires: dict[str, Wire] = {}
         stack.enter_context(opened_virtually(lambda: wires))
         stack.enter_context(_quietly())
-        truth = Truth(configuration.geometry, configuration.wiring, seed, zero_hold_s=1e9, drives=drives)
+        errors = strengths(configuration)
+        truth = Truth(
+            configuration.geometry, configuration.wiring, seed, zero_hold_s=1e9, strengths=errors, drives=drives
+        )
         world = World(Hub(seed), configuration, truth, directory, wires)
         stack.callback(world.stop)
         world.run(STARTS_WITHIN_S)
