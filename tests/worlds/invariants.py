@@ -6,7 +6,6 @@ Of each setpoint: `within_bound`, `steady_correction`, `true_reason`. Of a whole
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping
 
 import numpy as np
@@ -36,7 +35,7 @@ def within_bound(sight: Sight) -> str:
 
 def excused(sight: Sight) -> bool:
     """Whether no data can show what is wrong: a fault of docs/reference/blind-spots.md, found by a program."""
-    return sight.setpoint.time_s - sight.setpoint.age_s <= sight.left_s < math.inf
+    return sight.left_unseen
 
 
 def steady_correction(sight: Sight) -> str:

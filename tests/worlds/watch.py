@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
@@ -11,6 +10,7 @@ from compd.live.loop import Setpoint
 from compd.setpoint_states import State
 from tests.worlds import invariants
 from tests.worlds.coverage import Coverage
+from tests.worlds.departure import Departure
 from tests.worlds.recovery import Recovery
 from tests.worlds.sight import Happening, Sight
 from tests.worlds.world import Told, World
@@ -53,7 +53,7 @@ class Watch:
         self._recent: list[Happening] = []
         self._suspects: set[str] = set()
         self._before: Setpoint | None = None
-        self._rested_s, self._left_s = self._began_s, math.inf
+        self._departure = Departure(self.world)
         self._faulty_since_s: float | None = None
         self.world.hearers.append(self.hear)
 
@@ -84,8 +84,6 @@ class Watch:
         self.setpoints += 1
         self.digest.update(setpoint.line or setpoint.to_json())
         now_s = self.world.hub.now_s
-        self._left_s = min(self._left_s, self._rested_s) if told.moving else math.inf
-        self._rested_s = now_s if not told.moving else self._rested_s
         self._recent = [happening for happening in self._recent if happening.concerns(now_s)]
         sight = Sight(
             self.world.configuration,
@@ -94,7 +92,7 @@ class Watch:
             self._before,
             tuple(self._recent),
             frozenset(self._suspects),
-            self._left_s,
+            self._departure.unseen(setpoint, told),
         )
         self.coverage.count(sight.cases, told.valid, told.error_um, sight.bound_um)
         for name, invariant in invariants.OF_SETPOINTS.items():
