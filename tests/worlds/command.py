@@ -10,12 +10,14 @@ import sys
 import time
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures import Future, ProcessPoolExecutor, as_completed
+from itertools import islice
 from pathlib import Path
 from typing import NamedTuple
 
 import yaml
 
+from tests.worlds.compare import first_difference
 from tests.worlds.coverage import Coverage
 from tests.worlds.known import Known, known_worlds
 from tests.worlds.plan import Plan, draw
@@ -74,9 +76,8 @@ class Total:
     def table(self) -> str:
         """Coverage, validity and width of the bound."""
         coverage = self.coverage
-        rows = [
-            f"{'state':7} {'family':11} {'setpoints':>10} {'valid':>7} {'beyond':>8} {'at most':>8} {'stretches':>9}"
-        ]
+        head = ("setpoints", 10), ("valid", 7), ("beyond", 8), ("at most", 8), ("stretches", 9)
+        rows = [f"{'state':7} {'family':11} " + " ".join(f"{name:>{width}}" for name, width in head)]
         for case, share in coverage.shares():
             valid = coverage.valid[case] / coverage.all[case]
             beyond = share.beyond / share.setpoints if share.setpoints else float("nan")
@@ -105,6 +106,8 @@ class Total:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Play worlds. Returns 1 where something did not hold that is not known."""
     options = _options(arguments)
+    if options.compare:
+        return _compare(options)
     total, fails = Total(), 0
     for played in _played(options):
         total.add(played)
@@ -118,6 +121,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return 1 if fails and not (options.fresh_for and not options.fresh_fails) else 0
 
 
+def _compare(options: argparse.Namespace) -> int:
+    """Compare each seed with kernels for any processor. Returns 1 where a setpoint differs."""
+    differ = 0
+    for order in _orders(options):
+        difference = first_difference(order.plan)
+        differ += difference is not None
+        print(f"{order.line}: {difference or 'the same setpoints'}")
+    return 1 if differ else 0
+
+
 def _options(arguments: Sequence[str] | None) -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog="python -m tests.worlds", description=main.__doc__)
     parser.add_argument("--seed", type=int, action="append", help="this seed; may be given again")
@@ -125,9 +138,7 @@ def _options(arguments: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument("--minutes", type=float, default=1.0, help="simulated minutes of each seed")
     parser.add_argument("--machine", default="", help="a shipped file, a kind as linear-delta, or a path")
     parser.add_argument("--rates", default="campaign", help=f"{', '.join(COLUMNS)}, {NONE} or a file")
-    parser.add_argument(
-        "--fresh-for", type=float, default=0.0, metavar="SECONDS", help="fresh seeds for this real time"
-    )
+    parser.add_argument("--fresh-for", type=float, default=0.0, metavar="SECONDS", help="fresh seeds, in real time")
     parser.add_argument("--fresh-fails", action="store_true", help="fresh seeds fail the run, too")
     parser.add_argument("--jobs", type=int, default=1, help="worlds at once")
     parser.add_argument("--shrink-for", type=float, default=60.0, metavar="SECONDS", help="for each failing seed")
@@ -160,7 +171,10 @@ def fixed_orders(path: Path = SEEDS) -> list[Order]:
 def _played(options: argparse.Namespace) -> Iterator[Played]:
     """Every world, as soon as it has been played."""
     orders: Iterable[Order] = _orders(options)
-    count = None if options.fresh_for else len(orders := list(orders))
+    count = None
+    if not options.fresh_for:
+        orders = list(orders)
+        count = len(orders)
     if options.jobs == 1:
         for done, order in enumerate(orders):
             _bar(done / count if count else None)
@@ -168,11 +182,10 @@ def _played(options: argparse.Namespace) -> Iterator[Played]:
         return
     context = multiprocessing.get_context("spawn")
     with ProcessPoolExecutor(options.jobs, context) as pool:
-        waiting, done = set(), 0
-        orders = iter(orders)
+        waiting: set[Future[Played]] = set()
+        done, coming = 0, iter(orders)
         while True:
-            while len(waiting) < 2 * options.jobs and (order := next(orders, None)) is not None:
-                waiting.add(pool.submit(_play, order))
+            waiting.update(pool.submit(_play, order) for order in islice(coming, 2 * options.jobs - len(waiting)))
             if not waiting:
                 return
             future = next(as_completed(waiting))

@@ -34,8 +34,8 @@ def within_bound(sight: Sight) -> str:
 
 
 def excused(sight: Sight) -> bool:
-    """Whether no data can show what is wrong: a fault of docs/reference/blind-spots.md. A program decides it, no name."""
-    return False
+    """Whether no data can show what is wrong: a fault of docs/reference/blind-spots.md, found by a program."""
+    return sight.left_unseen
 
 
 def steady_correction(sight: Sight) -> str:

@@ -118,9 +118,9 @@ def _event(
     name, sort = (target.name, target.kind) if isinstance(target, Wired) else (target, "")
     parameters = {}
     for key, stated in kind.parameters.items():
-        if isinstance(stated, Mapping) and "comparator" in stated:
-            stated = stated["scale" if sort == "scale" else "comparator"]
-        parameters[key] = _drawn(stated, rng, links, name, targets)
+        by_sort = isinstance(stated, Mapping) and "comparator" in stated
+        own = stated["scale" if sort == "scale" else "comparator"] if by_sort else stated
+        parameters[key] = _drawn(own, rng, links, name, targets)
     return Event(round(time_s, _DIGITS), kind.family, kind.name, name, parameters)
 
 

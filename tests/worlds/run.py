@@ -14,7 +14,7 @@ from tests.worlds.coverage import NO_FAULT, Coverage
 from tests.worlds.faults import begin
 from tests.worlds.faults.fault import mend, present
 from tests.worlds.invariants import mostly_valid
-from tests.worlds.machines import fast, machine_file
+from tests.worlds.machines import fast, machine_file, measured_errors
 from tests.worlds.plan import Event, Plan
 from tests.worlds.rates import kinds
 from tests.worlds.sight import Happening, Sight
@@ -57,7 +57,8 @@ def play(
     with tempfile.TemporaryDirectory() as directory:
         path = machine_file(plan.machine, Path(directory))
         drives = Drives(_MM_PER_S, plan.mm_per_s2)
-        with built(path, plan.seed, drives, partial(fast, mm_per_s2=plan.mm_per_s2)) as world:
+        change = partial(fast, mm_per_s2=plan.mm_per_s2)
+        with built(path, plan.seed, drives, change, measured_errors) as world:
             return _Play(plan, world, hear).run(until)
 
 

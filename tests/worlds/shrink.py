@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
+from itertools import pairwise
 
 from tests.worlds.plan import Event, Plan
 from tests.worlds.run import play
@@ -73,7 +74,7 @@ def _complements(events: Sequence[Event], parts: int) -> list[Sequence[Event]]:
     """The events without each of `parts` parts."""
     parts = min(parts, len(events))
     edges = [round(k * len(events) / parts) for k in range(parts + 1)]
-    return [[*events[:a], *events[b:]] for a, b in zip(edges, edges[1:], strict=False)]
+    return [[*events[:a], *events[b:]] for a, b in pairwise(edges)]
 
 
 def _shortest(plan: Plan, tried: Callable[[Plan], Plan | None]) -> Plan:

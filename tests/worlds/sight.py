@@ -32,7 +32,8 @@ class Sight(NamedTuple):
     """One setpoint, with what is true of it.
 
     before : last valid setpoint before it. recent : what is present or ended less than `AFTER_S` ago, oldest first.
-    asked_s : when a person was last asked, monotonic s.
+    suspects : gauges that had a fault since a person last looked; "" where it could be any.
+    left_unseen : whether the machine has left its place, and no reading shows it yet.
     """
 
     configuration: Configuration
@@ -41,6 +42,7 @@ class Sight(NamedTuple):
     before: Setpoint | None
     recent: tuple[Happening, ...]
     suspects: frozenset[str]
+    left_unseen: bool
 
     @property
     def bound_um(self) -> float:

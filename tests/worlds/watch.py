@@ -10,6 +10,7 @@ from compd.live.loop import Setpoint
 from compd.setpoint_states import State
 from tests.worlds import invariants
 from tests.worlds.coverage import Coverage
+from tests.worlds.departure import Departure
 from tests.worlds.recovery import Recovery
 from tests.worlds.sight import Happening, Sight
 from tests.worlds.world import Told, World
@@ -52,11 +53,12 @@ class Watch:
         self._recent: list[Happening] = []
         self._suspects: set[str] = set()
         self._before: Setpoint | None = None
+        self._departure = Departure(self.world)
         self._faulty_since_s: float | None = None
         self.world.hearers.append(self.hear)
 
     def begins(self, happening: Happening) -> None:
-        """An event begins. Its gauges are under suspicion until a person has looked, all of them where it names none."""
+        """An event begins. Its gauges are suspects until a person has looked; all gauges where it names none."""
         self._recent.append(happening)
         self._recovery.begins(happening)
         if happening.is_fault:
@@ -84,7 +86,13 @@ class Watch:
         now_s = self.world.hub.now_s
         self._recent = [happening for happening in self._recent if happening.concerns(now_s)]
         sight = Sight(
-            self.world.configuration, setpoint, told, self._before, tuple(self._recent), frozenset(self._suspects)
+            self.world.configuration,
+            setpoint,
+            told,
+            self._before,
+            tuple(self._recent),
+            frozenset(self._suspects),
+            self._departure.unseen(setpoint, told),
         )
         self.coverage.count(sight.cases, told.valid, told.error_um, sight.bound_um)
         for name, invariant in invariants.OF_SETPOINTS.items():

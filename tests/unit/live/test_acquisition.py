@@ -154,7 +154,7 @@ def test_a_late_reply_is_never_taken_for_a_new_one(tmp_path: Path, name: str) ->
         since = latest.now
         latest.wait_for(f"ag.{channel}", Quality.TIMEOUT, since)
         device_rig.values[channel] = case.values[channel] / 2  # before the fault ends: every sound reply shows this
-        changed_s = MonotonicClock().monotonic()
+        changed_s = THIS_COMPUTER.monotonic()
         device_rig.wire.fault = None
         while (reading := latest.wait_for(f"ag.{channel}", OK, since)).time_s < changed_s:
             since = latest.now

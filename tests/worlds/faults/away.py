@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import partial
+from operator import add
 
 from tests.worlds.faults.fault import Fault
 from tests.worlds.faults.layers import Remove, distort, only
@@ -37,7 +39,7 @@ def away(
         end()
         for channel, value in zip(channels, before, strict=True):
             by = more(value, true_value(world, channel))
-            undo.append(distort(world, channel.gauge, only(channel.channel, lambda shown, by=by: shown + by)))
+            undo.append(distort(world, channel.gauge, only(channel.channel, partial(add, by))))
 
     def end() -> None:
         while undo:

@@ -6,6 +6,8 @@ What stays wrong is mended after a time, or when a person looks at the machine.
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
+from operator import add
 
 import numpy as np
 
@@ -100,5 +102,4 @@ def lose_counts(world: World, was_mm: np.ndarray) -> None:
     """Every scale shows what it showed at `was_mm` (n), wherever the machine is now, and counts on from there."""
     channels = [channel for channel in wired(world.configuration) if channel.kind == "scale"]
     for channel, mm in zip(channels, (was_mm - world.scale_mm()).tolist(), strict=True):
-        more = channel.sign * mm
-        distort(world, channel.gauge, only(channel.channel, lambda value, more=more: value + more))
+        distort(world, channel.gauge, only(channel.channel, partial(add, channel.sign * mm)))

@@ -6,6 +6,7 @@ Whoever takes machine zero or accepts has looked at the machine before, and mend
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 from tests.worlds.faults.fault import Fault, mend
 from tests.worlds.world import World
@@ -66,11 +67,11 @@ def reload(world: World, target: str, key: str, factor: float) -> Fault:
     return Fault(world, lasts_s=0.0)
 
 
-def _times(key: str, factor: float) -> Callable[[dict], None]:
+def _times(key: str, factor: float) -> Callable[[dict[str, Any]], None]:
     """A change of a configuration's document: the number at `key`, as "limits.slew_mm_per_s", times `factor`."""
     *sections, last = key.split(".")
 
-    def change(document: dict) -> None:
+    def change(document: dict[str, Any]) -> None:
         part = document
         for section in sections:
             part = part[section]
