@@ -10,7 +10,9 @@ import pytest
 from compd.setpoint_states import State
 from compd.simulation.truth.motion import Drives
 from tests.support.paths import CONFIG
-from tests.worlds.faults import keep_busy, line_of, lose_replies, scales
+from tests.worlds.faults.computer import keep_busy
+from tests.worlds.faults.replies import lost as replies_lost
+from tests.worlds.faults.wiring import line_of, scales
 from tests.worlds.world import World, built
 
 MACHINES = ("tripod-cmm.yaml", pytest.param("hexapod.yaml", marks=pytest.mark.long))
@@ -52,7 +54,7 @@ def valid_share(world: World) -> float:
 )
 def test_lost_replies_cost_little(name: str, count: int, share: float, seed: int) -> None:
     def lost(world: World, gauge: str) -> float:
-        lose_replies(world, line_of(world, gauge), count)
+        replies_lost(world, line_of(world, gauge), count)
         return world.hub.now_s
 
     assert valid_share(after(name, seed, lost)) >= share

@@ -10,7 +10,10 @@ import pytest
 
 from compd.simulation.truth.motion import DRIVES, Drives
 from tests.support.paths import CONFIG
-from tests.worlds.faults import line_of, lose_counts, scales, shift, silence, unplug
+from tests.worlds.faults.gauges import lose_counts, shift
+from tests.worlds.faults.lines import cable
+from tests.worlds.faults.replies import silent
+from tests.worlds.faults.wiring import line_of, scales
 from tests.worlds.world import World, built
 
 MACHINES = ("tripod-cmm.yaml", "hexapod.yaml")
@@ -23,9 +26,9 @@ Fault = Callable[[World, np.random.Generator], float]
 
 
 def silent_until_the_drive_has_ended(world: World, rng: np.random.Generator) -> float:
-    """All links drive and stop while one scale, read at rest, says nothing; the others stand when it is still silent."""
+    """One scale, read at rest, says nothing while all links drive and stop, nor when the others stand again."""
     place_mm = begin(world, rng, 6.0)
-    silence(world, line_of(world, rng.choice(scales(world))), rng.uniform(0.45, 0.7))
+    silent(world, line_of(world, str(rng.choice(scales(world)))), rng.uniform(0.45, 0.7))
     world.drive(place_mm - np.sign(place_mm) * rng.uniform(3.0, 8.0))
     world.run(0.1)  # the bound leaves out the departure of a machine that has rested for long
     since_s = world.forget()
@@ -39,7 +42,7 @@ def moved_while_all_scales_were_away(world: World, rng: np.random.Generator) -> 
     place_mm = begin(world, rng, 6.0)
     since_s, was_mm = world.forget(), world.scale_mm()
     for gauge in scales(world):
-        unplug(world, line_of(world, gauge), 2.0)
+        cable(world, line_of(world, gauge), 2.0)
     world.run(0.1)
     world.drive(place_mm - np.sign(place_mm) * rng.uniform(3.0, 15.0))
     world.arrive()

@@ -34,6 +34,7 @@ from compd.plugins import load as load_plugin
 from compd.setpoint_states import State
 from compd.simulation import World as Truth
 from compd.simulation.truth.motion import DRIVES, Drives
+from compd.simulation.truth.strengths import Strengths
 from compd.simulation.wires.server import STEP_S, LiveWorld, Sensing
 from tests.worlds.hub import Hub
 from tests.worlds.wires import Wire, opened_virtually
@@ -63,7 +64,7 @@ class World:
     Attributes
     ----------
     wires : by name of the line. shown : by gauge, changes what its device senses: (channel, true value) -> value.
-    told : every setpoint since the last `forget`.
+    told : every setpoint since the last `forget`. hearers : called with each setpoint and with what is true of it.
     """
 
     def __init__(self, hub: Hub, configuration: Configuration, truth: Truth, directory: Path, wires: dict[str, Wire]):
@@ -73,6 +74,7 @@ class World:
         self.wires = wires
         self.shown: dict[str, Callable[[str, float], float]] = {}
         self.told: list[Told] = []
+        self.hearers: list[Callable[[Setpoint, Told], None]] = []
         self._live = LiveWorld(truth, hub)
         self._directory = directory
         self._plug_in_devices()
@@ -257,9 +259,10 @@ class World:
                 error_um = 1e3 * float(np.linalg.norm(np.subtract(_tip_mm(setpoint, truth.tip_frame), true_mm)))
             moving = truth.phase == "moving"
         u_tip_um = math.nan if setpoint.u_tip_um is None else setpoint.u_tip_um
-        self.told.append(
-            Told(setpoint.time_s, setpoint.valid, setpoint.state, setpoint.reason, u_tip_um, error_um, moving)
-        )
+        told = Told(setpoint.time_s, setpoint.valid, setpoint.state, setpoint.reason, u_tip_um, error_um, moving)
+        self.told.append(told)
+        for hear in self.hearers:
+            hear(setpoint, told)
 
 
 def _tip_mm(setpoint: Setpoint, frame: str) -> np.ndarray:
@@ -274,8 +277,12 @@ def built(
     seed: int,
     drives: Drives = DRIVES,
     change: Callable[[dict[str, Any]], None] = lambda document: None,
+    strengths: Callable[[Configuration], Strengths | None] = lambda configuration: None,
 ) -> Iterator[World]:
-    """A world of a configuration, at machine zero, ready. `change`: of its document before it is loaded."""
+    """A world of a configuration, at machine zero, ready.
+
+    change : of its document before it is loaded. strengths : of the truth's error sources; ordinary ones for None.
+    """
     random.seed(seed)
     with ExitStack() as stack:
         directory = Path(tempfile.mkdtemp(prefix="compd-world-", dir="/dev/shm" if Path("/dev/shm").is_dir() else None))
@@ -288,7 +295,10 @@ def built(
         wires: dict[str, Wire] = {}
         stack.enter_context(opened_virtually(lambda: wires))
         stack.enter_context(_quietly())
-        truth = Truth(configuration.geometry, configuration.wiring, seed, zero_hold_s=1e9, drives=drives)
+        errors = strengths(configuration)
+        truth = Truth(
+            configuration.geometry, configuration.wiring, seed, zero_hold_s=1e9, strengths=errors, drives=drives
+        )
         world = World(Hub(seed), configuration, truth, directory, wires)
         stack.callback(world.stop)
         world.run(STARTS_WITHIN_S)

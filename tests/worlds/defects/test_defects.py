@@ -10,7 +10,8 @@ import pytest
 from tests.support.paths import CONFIG, ROOT
 from tests.worlds.defects.described import DEFECTS, PATCHES
 from tests.worlds.defects.patched import apply, patched, run
-from tests.worlds.faults import scales, shift
+from tests.worlds.faults.gauges import shift
+from tests.worlds.faults.wiring import scales
 from tests.worlds.test_wrong_and_valid import MOST, begin
 from tests.worlds.world import built
 

@@ -1,0 +1,84 @@
+"""What must hold in every world: each a function that says what does not hold, and "" where it holds.
+
+Of each setpoint: `within_bound`, `steady_correction`, `true_reason`. Of a whole world: `mostly_valid`, and what
+`tests.worlds.recovery` and `tests.worlds.run` see of its course.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+import numpy as np
+
+from compd.configuration import Configuration
+from compd.setpoint_states import State
+from tests.worlds.coverage import Coverage
+from tests.worlds.sight import Sight
+
+# A valid setpoint may be wrong by so many times its bound.
+MOST = 3.0
+# Share of valid setpoints in a world without faults.
+VALID_SHARE = 0.99
+# Rounding of a correction and of a time, mm and s.
+_ROUNDING_MM, _ROUNDING_S = 1e-9, 1e-6
+
+Invariant = Callable[[Sight], str]
+
+
+def within_bound(sight: Sight) -> str:
+    """No valid setpoint is beyond three times its bound, unless no data can show why."""
+    told, bound_um = sight.told, sight.bound_um
+    if not told.valid or not told.error_um > MOST * bound_um or excused(sight):
+        return ""
+    return f"{told.error_um:.4g} um of a bound of {bound_um:.4g} um while {told.state}"
+
+
+def excused(sight: Sight) -> bool:
+    """Whether no data can show what is wrong: a fault of docs/reference/blind-spots.md, found by a program."""
+    return sight.left_unseen
+
+
+def steady_correction(sight: Sight) -> str:
+    """A correction changes no faster than `limits.slew_mm_per_s`, whatever is adopted, reloaded or accepted."""
+    before, now = sight.before, sight.setpoint
+    if before is None or before.values is None or now.values is None:
+        return ""
+    passed_s = max(now.time_s - before.time_s, 1.0 / sight.configuration.loop.rate_hz) + _ROUNDING_S
+    allowed_mm = sight.configuration.limits.slew_mm_per_s * passed_s + _ROUNDING_MM
+    changes_mm = np.abs(now.values.correction_mm - before.values.correction_mm)
+    if not changes_mm.size or not (largest_mm := float(changes_mm.max())) > allowed_mm:
+        return ""
+    return f"a correction changed by {largest_mm:.6g} mm in {passed_s:.4g} s; allowed {allowed_mm:.4g} mm"
+
+
+def true_reason(sight: Sight) -> str:
+    """A reason that asks a person to look at gauges names at least one that had a fault since a person last looked."""
+    told = sight.told
+    if told.state is not State.FAULT or "" in sight.suspects:
+        return ""
+    named = named_in(told.reason, sight.configuration)
+    if not named or named & sight.suspects:
+        return ""
+    return f"names {', '.join(sorted(named))}, none of which had a fault: {told.reason[:200]}"
+
+
+def named_in(reason: str, configuration: Configuration) -> set[str]:
+    """Gauges that a reason names, as words of their own."""
+    words = set("".join(c if c.isalnum() or c == "_" else " " for c in reason).split())
+    return words & set(configuration.gauges)
+
+
+OF_SETPOINTS: Mapping[str, Invariant] = {
+    invariant.__name__: invariant for invariant in (within_bound, steady_correction, true_reason)
+}
+
+
+def mostly_valid(coverage: Coverage, without_faults: bool) -> str:
+    """In a world without faults at least 99 % of the setpoints are valid."""
+    setpoints = coverage.all.total()
+    if not without_faults or not setpoints:
+        return ""
+    share = coverage.valid.total() / setpoints
+    return (
+        "" if share >= VALID_SHARE else f"{100 * share:.2f} % valid without a fault; at least {100 * VALID_SHARE:g} %"
+    )

@@ -1,0 +1,125 @@
+"""Plays a plan in a world and reports what it saw."""
+
+from __future__ import annotations
+
+import tempfile
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+
+from compd.simulation.truth.motion import Drives
+from tests.worlds.coverage import NO_FAULT, Coverage
+from tests.worlds.faults import begin
+from tests.worlds.faults.fault import mend, present
+from tests.worlds.invariants import mostly_valid
+from tests.worlds.machines import fast, machine_file, measured_errors
+from tests.worlds.plan import Event, Plan
+from tests.worlds.rates import kinds
+from tests.worlds.sight import Happening, Sight
+from tests.worlds.watch import Finding, Watch
+from tests.worlds.world import World, built
+
+# How often a person looks at the display, and how long it may ask before the person acts, s.
+LOOKS_EVERY_S, ACTS_AFTER_S = 0.25, 3.0
+# From the repair of gauges to their acceptance, s.
+ACCEPTS_AFTER_S = 0.5
+# Speed of the drives before the first event, mm/s.
+_MM_PER_S = 50.0
+_WORK = {f"{kind.family}.{kind.name}" for kind in kinds() if not kind.fault}
+
+
+@dataclass
+class Report:
+    """What a world showed. skipped : events that the world cannot play, by kind. asked : how often a person came."""
+
+    plan: Plan
+    setpoints: int
+    sha256: str
+    coverage: Coverage
+    findings: list[Finding]
+    skipped: Counter[str]
+    asked: int
+
+    @property
+    def valid_share(self) -> float:
+        return self.coverage.valid.total() / max(1, self.coverage.all.total())
+
+
+def play(
+    plan: Plan, hear: Callable[[Sight], object] | None = None, until: Callable[[Watch], bool] = lambda watch: False
+) -> Report:
+    """Play a plan.
+
+    hear : called with every setpoint. until : ends the world early; asked after every step.
+    """
+    with tempfile.TemporaryDirectory() as directory:
+        path = machine_file(plan.machine, Path(directory))
+        drives = Drives(_MM_PER_S, plan.mm_per_s2)
+        change = partial(fast, mm_per_s2=plan.mm_per_s2)
+        with built(path, plan.seed, drives, change, measured_errors) as world:
+            return _Play(plan, world, hear).run(until)
+
+
+class _Play:
+    """One plan in its world."""
+
+    def __init__(self, plan: Plan, world: World, hear: Callable[[Sight], object] | None) -> None:
+        self._plan, self._world = plan, world
+        self._watch = Watch(world, hear_also=hear)
+        self._skipped: Counter[str] = Counter()
+        self._asked = 0
+        self._began_s = world.hub.now_s
+
+    def run(self, until: Callable[[Watch], bool]) -> Report:
+        plan, watch = self._plan, self._watch
+        try:
+            for event in plan.events:
+                self._until(event.time_s, until)
+                if until(watch):
+                    break
+                self._begin(event)
+            self._until(plan.duration_s, until)
+        except AssertionError:
+            if not self._world.hub.died:
+                raise
+            watch.note("no_traceback", self._blame(), self._world.hub.died[0])
+        without_faults = all(event.name in _WORK for event in plan.events)
+        if text := mostly_valid(watch.coverage, without_faults):
+            watch.note("mostly_valid", NO_FAULT, text)
+        return Report(
+            plan,
+            watch.setpoints,
+            watch.digest.hexdigest(),
+            watch.coverage,
+            list(watch.found.values()),
+            self._skipped,
+            self._asked,
+        )
+
+    def _until(self, time_s: float, until: Callable[[Watch], bool]) -> None:
+        """Let time pass to `time_s` of the plan, with a person who looks now and then."""
+        world, watch = self._world, self._watch
+        while (left_s := self._began_s + time_s - world.hub.now_s) > 0 and not until(watch):
+            world.run(min(left_s, LOOKS_EVERY_S))
+            world.forget()
+            if watch.asks_for_s >= ACTS_AFTER_S:
+                self._asked += 1
+                mend(world)
+                world.run(ACCEPTS_AFTER_S)
+                world.accept()
+                watch.accepted()
+
+    def _begin(self, event: Event) -> None:
+        try:
+            fault = begin(self._world, event.family, event.kind, event.target, event.parameters)
+        except AttributeError as missing:
+            if missing.obj is not self._world:
+                raise
+            self._skipped[event.name] += 1
+            return
+        self._watch.begins(Happening(event, fault, event.name not in _WORK))
+
+    def _blame(self) -> str:
+        return f"{len(present(self._world))} faults present"

@@ -1,0 +1,118 @@
+"""Watches one world: a digest of its setpoints, its coverage, and what does not hold."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+from compd.live.loop import Setpoint
+from compd.setpoint_states import State
+from tests.worlds import invariants
+from tests.worlds.coverage import Coverage
+from tests.worlds.departure import Departure
+from tests.worlds.recovery import Recovery
+from tests.worlds.sight import Happening, Sight
+from tests.worlds.world import Told, World
+
+
+@dataclass
+class Finding:
+    """Something that did not hold in a world, once for each invariant and each set of faults beside it.
+
+    time_s : of its first occurrence, from the beginning of the plan. count : of setpoints.
+    """
+
+    what: str
+    blame: str
+    time_s: float
+    text: str
+    count: int = 1
+
+    def __str__(self) -> str:
+        return f"{self.what} at {self.time_s:.3f} s, {self.count} times, beside {self.blame}: {self.text}"
+
+
+@dataclass
+class Watch:
+    """Hears every setpoint of a world. Nothing in it grows with time but counts.
+
+    found : findings by invariant and faults beside it.
+    """
+
+    world: World
+    digest: hashlib._Hash = field(default_factory=hashlib.sha256)
+    coverage: Coverage = field(default_factory=Coverage)
+    found: dict[tuple[str, str], Finding] = field(default_factory=dict)
+    setpoints: int = 0
+    hear_also: Callable[[Sight], object] | None = None
+
+    def __post_init__(self) -> None:
+        self._began_s = self.world.hub.now_s
+        self._recovery = Recovery()
+        self._recent: list[Happening] = []
+        self._suspects: set[str] = set()
+        self._before: Setpoint | None = None
+        self._departure = Departure(self.world)
+        self._faulty_since_s: float | None = None
+        self.world.hearers.append(self.hear)
+
+    def begins(self, happening: Happening) -> None:
+        """An event begins. Its gauges are suspects until a person has looked; all gauges where it names none."""
+        self._recent.append(happening)
+        self._recovery.begins(happening)
+        if happening.is_fault:
+            self._suspects.update(happening.fault.targets or ("",))
+
+    def accepted(self) -> None:
+        """A person has looked at every gauge."""
+        now_s = self.world.hub.now_s
+        self._recovery.accepted(now_s)
+        self._faulty_since_s = None
+        self._suspects = set()
+        for happening in self._recent:
+            if happening.is_fault and happening.concerns(now_s):
+                self._suspects.update(happening.fault.targets or ("",))
+
+    @property
+    def asks_for_s(self) -> float:
+        """How long the daemon has been asking for a person, s."""
+        return 0.0 if self._faulty_since_s is None else self.world.hub.now_s - self._faulty_since_s
+
+    def hear(self, setpoint: Setpoint, told: Told) -> None:
+        """Take in one setpoint."""
+        self.setpoints += 1
+        self.digest.update(setpoint.line or setpoint.to_json())
+        now_s = self.world.hub.now_s
+        self._recent = [happening for happening in self._recent if happening.concerns(now_s)]
+        sight = Sight(
+            self.world.configuration,
+            setpoint,
+            told,
+            self._before,
+            tuple(self._recent),
+            frozenset(self._suspects),
+            self._departure.unseen(setpoint, told),
+        )
+        self.coverage.count(sight.cases, told.valid, told.error_um, sight.bound_um)
+        for name, invariant in invariants.OF_SETPOINTS.items():
+            if text := invariant(sight):
+                self.note(name, sight.blame, text)
+        if text := self._recovery.late(sight):
+            self.note("valid_again", sight.blame, text)
+        if told.state is not State.FAULT:
+            self._faulty_since_s = None
+        elif self._faulty_since_s is None:
+            self._faulty_since_s = now_s
+        if told.valid:
+            self._before = setpoint
+        if self.hear_also is not None:
+            self.hear_also(sight)
+
+    def note(self, what: str, blame: str, text: str) -> None:
+        """Something does not hold now."""
+        known = self.found.get((what, blame))
+        if known is None:
+            self.found[what, blame] = Finding(what, blame, self.world.hub.now_s - self._began_s, text)
+        else:
+            known.count += 1
