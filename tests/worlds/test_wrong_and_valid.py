@@ -26,13 +26,12 @@ Fault = Callable[[World, np.random.Generator], float]
 
 
 def silent_until_the_drive_has_ended(world: World, rng: np.random.Generator) -> float:
-    """All links drive and stop while one scale says nothing; the others stand when it is still silent."""
+    """One scale, read at rest, says nothing while all links drive and stop, nor when the others stand again."""
     place_mm = begin(world, rng, 6.0)
-    gauge = rng.choice(scales(world))
+    silent(world, line_of(world, str(rng.choice(scales(world)))), rng.uniform(0.45, 0.7))
     world.drive(place_mm - np.sign(place_mm) * rng.uniform(3.0, 8.0))
-    world.run(0.05)  # not at the departure, which the bound leaves out while the machine has rested for long
+    world.run(0.1)  # the bound leaves out the departure of a machine that has rested for long
     since_s = world.forget()
-    silent(world, line_of(world, gauge), rng.uniform(0.3, 0.7))
     world.arrive()
     world.run(1.0)
     return since_s
