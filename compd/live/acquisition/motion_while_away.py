@@ -11,7 +11,7 @@ import numpy.typing as npt
 from compd.live.memory import Doubt, TrustMemory
 
 # Wait (s) for the missing gauges after an absence of all; then those that are back are compared alone.
-_WAIT_FOR_OTHERS_S = 2.0
+WAIT_FOR_OTHERS_S = 2.0
 
 
 class MotionWhileAway(NamedTuple):
@@ -41,7 +41,7 @@ def moved_while_away(memory: TrustMemory, i: int, back_s: float, now_s: float) -
     good = known & (memory.doubt[:n] == Doubt.NONE)
     stayed = good & (memory.time_s[:n] > memory.lost_s[i])
     back = known & (memory.shown_s[:n] > memory.lost_s[i])
-    waited = now_s - back_s >= _WAIT_FOR_OTHERS_S
+    waited = now_s - back_s >= WAIT_FOR_OTHERS_S
     scales = np.arange(n) < memory.scales
     sees_motion = bool(stayed[scales].any()) or not memory.scales
     if sees_motion and (waited or (stayed == good).all()):

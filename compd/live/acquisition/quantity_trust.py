@@ -28,7 +28,7 @@ LASTING_S = 1.0
 _MAX_SHARE_S = LASTING_S / 5
 # A quantity begins at the median of this many readings, or of those within this time (s), so that a single reading does
 # not decide for all that follow. Its neighbours are awaited for the same time.
-_MIN_FIRST, _MAX_START_S = 5, 1.0
+_MIN_FIRST, MAX_START_S = 5, 1.0
 # Age (s) from which a neighbour's reading no longer counts.
 _OLD_S = 60.0
 _MIN_NEIGHBOURS = 2
@@ -179,13 +179,13 @@ class QuantityTrust:
         passed_s = reading.time_s - self._begun_s
         values = [each.value for each in self._first]
         if math.isfinite(self._limits.fastest_per_s):
-            if len(values) < _MIN_FIRST and passed_s < _MAX_START_S:
+            if len(values) < _MIN_FIRST and passed_s < MAX_START_S:
                 return bad(reading.time_s, Quality.MISMATCH, "has been read too few times yet")
             scatter, possible = max(values) - min(values), self._possible_change(reading.time_s, self._first[0].time_s)
             if scatter > 2 * self._limits.tolerance + possible:
                 return self._scattering(reading, scatter)
         unread = np.isnan(self._memory.shown[self._neighbours]).any() and math.isfinite(self._limits.apart)
-        if unread and passed_s < _MAX_START_S:
+        if unread and passed_s < MAX_START_S:
             return bad(reading.time_s, Quality.MISMATCH, "its neighbours have not been read yet")
         return self._from(float(np.median(values)), reading)
 

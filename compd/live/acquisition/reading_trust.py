@@ -38,7 +38,7 @@ MIN_MOTION = 10.0
 # Longest time (s) without an answer in which a part at rest may move unnoticed: with 300 mm/s2 by less than 1 mm.
 MIN_GAP_S = 0.1
 # Longest wait (s) after a gap for what others say: somewhat longer than the path of `way_evidence` takes.
-_WAIT_FOR_OTHERS_S = 0.1
+WAIT_FOR_OTHERS_S = 0.1
 # Smallest step (signal periods): an interpolator that loses counts loses whole periods or quarters of them.
 MIN_PERIODS = 0.25
 # Two answers agree if they differ by less than this share of the jump that they show.
@@ -368,12 +368,12 @@ class ReadingTrust:
             )
             explained = any(way is not None and way.explains(way_mm) for way in (by_links, by_itself))
             waits = not explained and by_links is None
-            expected = by_links or (by_itself if waited_s >= _WAIT_FOR_OTHERS_S else None)
+            expected = by_links or (by_itself if waited_s >= WAIT_FOR_OTHERS_S else None)
             if expected is not None and not explained:
                 return self._returned(reading, way_mm - expected.way_mm)
         else:
             waits = False
-        if waits and waited_s < _WAIT_FOR_OTHERS_S:
+        if waits and waited_s < WAIT_FOR_OTHERS_S:
             return bad(reading.time_s, Quality.MISMATCH, "has moved in a gap; the others do not show yet how far")
         for later in after:
             if later.time_s < sample.time_s:
