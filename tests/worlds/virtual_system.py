@@ -232,6 +232,7 @@ class VirtualSystem(System):
     def start(self, run: Callable[[], object], name: str) -> VirtualProcess:
         """Start a process that no other one waits for: the supervisor's, a client's."""
         process = self.processes[name] = VirtualProcess(self, run, name, 1000 + len(self.owner))
+        self.hub.pause(name, 0.0)  # the one of that name before it may have been stopped
         return process
 
     def thread(self, run: Callable[[], object], name: str) -> threading.Thread:

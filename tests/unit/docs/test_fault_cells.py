@@ -8,7 +8,7 @@ from typing import Any
 
 from docs.generate import blind_spots, faults
 from docs.generate.fault_cells import measured
-from tests.injection.measured import SHOWN, write_cells
+from tests.injection.measured import SHOWN, write
 
 FIGURES: dict[str, Any] = {"most": 0.5, "beyond": 0, "setpoints": 300, "reasons": ["none of the page's business"]}
 
@@ -31,8 +31,8 @@ RESULTS = [
 def document(tmp_path: Path) -> Any:
     """As the run writes it, beside the outcomes that the file had."""
     path = tmp_path / "faults.json"
-    path.write_text('{"command": "before", "date": "2026-01-01", "outcomes": {"scale-jumps": {"worst_um": 7.5}}}')
-    write_cells(path, RESULTS)
+    path.write_text('{"command": "before", "outcomes": {"scale-jumps": {"worst_um": 7.5}}}')
+    write(path, [], RESULTS)
     return json.loads(path.read_text())
 
 
@@ -69,8 +69,8 @@ def test_a_blind_spot_has_the_number_of_what_was_injected(tmp_path: Path) -> Non
 def test_the_file_keeps_what_the_page_shows_and_what_another_run_wrote(tmp_path: Path) -> None:
     written = document(tmp_path)
     assert written["outcomes"] == {"scale-jumps": {"worst_um": 7.5}}
-    assert set(written["cells"]["results"][0]) == set(SHOWN)
-    assert written["cells"]["command"].startswith("make faults OPTIONS=")
+    assert set(written["cells"][0]) == set(SHOWN)
+    assert written["command"].startswith("make faults OPTIONS=")
 
 
 def test_without_such_a_run_the_pages_have_no_such_figures() -> None:
