@@ -11,8 +11,7 @@ from typing import Any
 import pytest
 
 from compd.commissioning import BLIND_SPOTS
-from tests.injection import __main__ as run
-from tests.injection.__main__ import Tried, all_names, sample
+from tests.injection import run
 from tests.injection.case import Way
 from tests.injection.cells.cell import Cell, all_cells
 from tests.injection.cells.report import report
@@ -20,6 +19,7 @@ from tests.injection.cells.situation import Situation
 from tests.injection.cells.trial import CellResult
 from tests.injection.machine import UNKNOWN, Held
 from tests.injection.matrix import FAULTS, VIRTUAL
+from tests.injection.run import Tried, all_names, sample
 from tests.injection.trial import Outcome
 from tests.injection.verdict import Verdict, judge, tip_bound_um
 from tests.support.watching import Seen
