@@ -43,8 +43,9 @@ EXPANSION, EXPANSION_PPM_PER_K = "link_expansion", 11.5
 ENDS_WITHIN_S, ANSWERED_WITHIN_S = 10.0, 10.0
 # How often a client that has no daemon tries again, and how often something is looked at, s.
 AGAIN_S, LOOK_EVERY_S = 0.02, 0.02
-# Between two motions of a machine that measures.
-DWELL_S = 0.15
+# Between two motions of a machine that measures: less than 19 times the age of its scales' readings, after which it is
+# taken to rest (`departure_from_rest`).
+DWELL_S = 0.08
 # Mean time between two stalls of a busy computer, s.
 STALLS_EVERY_S = 1.0
 FOR_EVER_S = 1e6

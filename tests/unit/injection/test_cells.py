@@ -204,8 +204,10 @@ def test_a_run_names_what_is_wrong_and_what_could_not_be_tried(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     def tried(names: Sequence[str], jobs: int) -> list[Tried]:
-        right = result(cell("scale-jumps@rest"), Verdict(setpoints=9, worst_um=0.2, most=0.3, bound_um=0.7)).as_data()
-        return [Tried(name, None if "load" in name else {**right, "cell": name}, "the reason") for name in names]
+        right = Verdict(setpoints=9, worst_um=0.2, most=0.3, bound_um=0.7)
+        return [
+            Tried(name, None if "load" in name else result(cell(name), right).as_data(), "the reason") for name in names
+        ]
 
     monkeypatch.setattr(run, "_try", tried)
     assert run.main(["scale-jumps@*"]) == 1
