@@ -28,6 +28,8 @@ from tests.injection.trial import settle, try_case
 from tests.injection.virtual import VirtualMachine
 from tests.support.simulated import run_directory
 
+# Trials of one process: what worlds map into its memory ends with it.
+TASKS_PER_PROCESS = 20
 # What `--sample` takes: one in eleven, so that all four situations and a machine without a fault are among them.
 SAMPLE = slice(2, None, 11)
 
@@ -86,7 +88,10 @@ def _try(names: Sequence[str], jobs: int) -> list[Tried]:
     """Try them side by side; in their order."""
     context = multiprocessing.get_context("spawn")
     tried = []
-    with ProcessPoolExecutor(jobs, context) as pool, count_shown(len(names), "trials") as shown:
+    with (
+        ProcessPoolExecutor(jobs, context, max_tasks_per_child=TASKS_PER_PROCESS) as pool,
+        count_shown(len(names), "trials") as shown,
+    ):
         for number, one in enumerate(pool.map(try_named, names), start=1):
             tried.append(one)
             shown(number)
