@@ -10,13 +10,13 @@ from pathlib import Path
 
 import numpy as np
 
-from compd.clock import MonotonicClock
 from compd.gauge import Quality
 from compd.kernel_versions import kernel_versions
 from compd.live.daemon import model_columns
 from compd.live.loop import CyclePacker, CycleUnpacker, Directions, Target
 from compd.live.record import Recorder, RecordingLimits
 from compd.live.service import ReadingsMessage
+from compd.live.system import THIS_COMPUTER
 from compd.release import __version__
 from tests.support.live_machine import RAW_AT_ZERO_MM, Machine
 
@@ -110,7 +110,7 @@ class Run:
     def recorder(self, name: Path, limits=ROOMY, reports=None, **watch):
         """A recorder that has written everything when the block ends."""
         texts = [] if reports is None else reports
-        recorder = Recorder(name, self.version, self.watch | watch, limits, texts.append, MonotonicClock())
+        recorder = Recorder(name, self.version, self.watch | watch, limits, texts.append, THIS_COMPUTER)
         recorder.start()
         yield recorder
         recorder.close()

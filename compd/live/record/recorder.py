@@ -26,16 +26,16 @@ import threading
 from collections import deque
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from datetime import UTC, datetime, timedelta
+from datetime import timedelta
 from pathlib import Path
 
-from compd.clock import Clock
 from compd.configuration import Configuration
 from compd.errors import CompdError, RecordingError, StateError
 from compd.live.record.part_table import close_left_parts
 from compd.live.record.readings_feed import FeedItem
 from compd.live.record.recording_part import ORDER, RecordingPart
 from compd.live.record.table_rows import Message
+from compd.live.system import System
 from compd.table_file import PARQUET
 from compd.tables import TableFormat, arrow_modules
 
@@ -79,7 +79,7 @@ class Recorder:
         watch: Message,
         limits: RecordingLimits,
         report: Callable[[str], None],
-        clock: Clock,
+        system: System,
         table_format: TableFormat = TableFormat.CSV,
         configuration: Configuration | None = None,
     ) -> None:
@@ -106,7 +106,7 @@ class Recorder:
         self._every_cycle = "rate_hz" not in watch
         self._limits = limits
         self._report = report
-        self._clock = clock
+        self._system = system
         self._waiting: deque[FeedItem] = deque()
         self._received = 0
         self._rows_deleted = 0
@@ -115,7 +115,7 @@ class Recorder:
         self._origin_s = math.nan
         self._failure: CompdError | None = None
         self._stop = threading.Event()
-        self._thread = threading.Thread(target=self._run, name="recorder", daemon=True)
+        self._thread = system.thread(self._run, "recorder")
 
     def start(self) -> None:
         """Start the writing thread."""
@@ -193,7 +193,7 @@ class Recorder:
 
     def _write_until_stopped(self) -> None:
         try:
-            while not self._clock.wait(self._stop, _WRITE_EVERY_S):
+            while not self._system.wait(self._stop, _WRITE_EVERY_S):
                 self.write()
             self.write()
         finally:
@@ -255,8 +255,8 @@ class Recorder:
     def _new_part(self, item: FeedItem) -> RecordingPart:
         message = item.message
         stem = self._name.with_name(f"{self._name.name}-{self._part_count + 1:04d}")
-        age = timedelta(seconds=self._clock.monotonic() - message["time_s"])
-        started_at = (datetime.now(UTC) - age).isoformat(timespec="milliseconds")
+        age = timedelta(seconds=self._system.monotonic() - message["time_s"])
+        started_at = (self._system.utc() - age).isoformat(timespec="milliseconds")
         machine_file = self._machine_file(item.first_messages[0])
         part = RecordingPart(
             stem, item.first_messages, message, self._origin_s, started_at, self._table_format, machine_file

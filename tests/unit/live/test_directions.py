@@ -8,9 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from compd.clock import MonotonicClock
 from compd.gauge import Quality
 from compd.live.record.recorder import Recorder
+from compd.live.system import THIS_COMPUTER
 from tests.support.live_machine import machine
 from tests.support.recorded_run import ROOMY, Run
 
@@ -47,7 +47,7 @@ def test_a_reading_that_is_not_good_is_no_motion(run: Run) -> None:
 
 
 def test_a_thin_recording_has_the_way_that_was_not_recorded(run: Run, tmp_path: Path) -> None:
-    recorder = Recorder(tmp_path / "run", run.version, run.watch, ROOMY, lambda text: None, MonotonicClock())
+    recorder = Recorder(tmp_path / "run", run.version, run.watch, ROOMY, lambda text: None, THIS_COMPUTER)
     for cycles in ((0.0,), (5.0, 6.0), (5.5, 5.0)):  # every row at rest; between the last two it went out and came back
         recorder.put(*driven(run, *cycles))
     recorder.start()

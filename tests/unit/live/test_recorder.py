@@ -9,11 +9,11 @@ from dataclasses import replace
 import pytest
 import yaml
 
-from compd.clock import MonotonicClock
 from compd.errors import RecordingError, StateError
 from compd.gauge import Quality
 from compd.live.record.recorder import Recorder, RecordingLimits
 from compd.live.record.replay import RecordedCycles, replay_cycles
+from compd.live.system import THIS_COMPUTER, System
 from compd.recording import read_recording
 from tests.support.live_machine import Machine, machine
 from tests.support.recorded_run import ROOMY, Run, rows_of
@@ -59,7 +59,7 @@ def test_it_names_its_machine_where_the_daemon_runs_with_that_file(tmp_path):
     for name, config_hash in (("own", known.config_hash), ("changed", "0" * 64)):
         version = run.version | {"config_hash": config_hash}
         recorder = Recorder(
-            tmp_path / name, version, run.watch, ROOMY, reports.append, MonotonicClock(), configuration=known
+            tmp_path / name, version, run.watch, ROOMY, reports.append, THIS_COMPUTER, configuration=known
         )
         recorder.start()
         for line, message, _ in run.quiet(3):
@@ -220,7 +220,7 @@ def test_without_machine_zero_nothing_is_recorded_and_it_says_what_to_do(tmp_pat
 @pytest.mark.parametrize("suffix", [".csv", ".cycles.jsonl"])
 def test_a_disk_that_is_full_ends_it_with_whole_lines_and_a_cycle_for_every_row(tmp_path, suffix):
     run = Run(machine())
-    recorder = Recorder(tmp_path / "run", run.version, run.watch, ROOMY, lambda _: None, MonotonicClock())
+    recorder = Recorder(tmp_path / "run", run.version, run.watch, ROOMY, lambda _: None, THIS_COMPUTER)
     for line, message, _ in run.quiet(10):
         recorder.put(line, message)
     recorder.write()
@@ -238,7 +238,7 @@ def test_a_disk_that_is_full_ends_it_with_whole_lines_and_a_cycle_for_every_row(
 
 def test_a_part_that_the_disk_has_no_room_to_begin_leaves_no_file(tmp_path):
     run = Run(machine())
-    recorder = Recorder(tmp_path / "run", run.version, run.watch, ROOMY, lambda _: None, MonotonicClock())
+    recorder = Recorder(tmp_path / "run", run.version, run.watch, ROOMY, lambda _: None, THIS_COMPUTER)
     recorder.put(*run.recorded(run.machine.step())[:2])
     with room_for(100):
         recorder.start()
@@ -253,7 +253,7 @@ def test_a_directory_that_is_not_there_is_told(tmp_path):
         recorded(Run(machine()), tmp_path / "nowhere" / "run", 3)
 
 
-class Wakes:
+class Wakes(System):
     """A clock by which the writer wakes when the test says."""
 
     def __init__(self):
@@ -290,7 +290,7 @@ def test_what_came_is_on_disk_at_every_wake_and_it_wakes_more_than_once_a_second
 
 def test_a_writer_that_stalls_drops_rows_and_counts_them(tmp_path):
     run = Run(machine())
-    recorder = Recorder(tmp_path / "run", run.version, run.watch, ROOMY, lambda _: None, MonotonicClock())
+    recorder = Recorder(tmp_path / "run", run.version, run.watch, ROOMY, lambda _: None, THIS_COMPUTER)
     line, message, _ = run.recorded(run.machine.step())
     for _ in range(20_003):
         recorder.put(line, message)

@@ -13,10 +13,10 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
-from compd.clock import MonotonicClock
 from compd.errors import RecordingError
 from compd.live.record.recorder import Recorder
 from compd.live.record.replay import RecordedCycles, replay_cycles
+from compd.live.system import THIS_COMPUTER
 from compd.recording import convert_recording, read_recording
 from compd.tables import TableFormat
 from tests.support.live_machine import machine
@@ -43,7 +43,7 @@ sys.stdin.read()
 
 
 def parquet_recorder(run, name, limits=ROOMY, report=lambda _: None):
-    return Recorder(name, run.version, run.watch, limits, report, MonotonicClock(), TableFormat.PARQUET)
+    return Recorder(name, run.version, run.watch, limits, report, THIS_COMPUTER, TableFormat.PARQUET)
 
 
 @contextmanager

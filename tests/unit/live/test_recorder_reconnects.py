@@ -6,11 +6,11 @@ from contextlib import suppress
 
 import pytest
 
-from compd.clock import MonotonicClock
 from compd.errors import DaemonError
 from compd.live.record.readings_feed import ReadingsFeed
 from compd.live.record.recorder import Recorder
 from compd.live.record.replay import RecordedCycles, replay_cycles
+from compd.live.system import THIS_COMPUTER
 from tests.support.live_machine import machine
 from tests.support.recorded_run import ROOMY, Run, rows_of
 
@@ -72,7 +72,7 @@ def fed(tmp_path, answers, for_s=None, reports=None):
     """Record what the connections say; the recorder, closed."""
     reports, clock = [] if reports is None else reports, Turned()
     feed = ReadingsFeed(connecting(answers), None, reports.append, clock)
-    recorder = Recorder(tmp_path / "run", *feed.first_messages, ROOMY, reports.append, MonotonicClock())
+    recorder = Recorder(tmp_path / "run", *feed.first_messages, ROOMY, reports.append, THIS_COMPUTER)
     recorder.start()
     with suppress(NobodyLeft):
         recorder.follow(feed.messages(for_s))

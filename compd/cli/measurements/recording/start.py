@@ -64,24 +64,24 @@ def start(
     """
     from compd.cli.progress import ElapsedShown
     from compd.client import connect
-    from compd.clock import MonotonicClock
     from compd.live.record import ReadingsFeed, Recorder, RecordingLimits
+    from compd.live.system import THIS_COMPUTER
 
     keeping = RecordingLimits(
         round(part_mb * _MB), part_hours * _S_PER_H, round(limit_mb * _MB), when_full is WhenFull.DROP_OLDEST
     )
     for_s = burst if burst is not None else seconds
     signal.signal(signal.SIGTERM, signal.default_int_handler)
-    clock, configuration = MonotonicClock(), daemon_configuration(daemon)
+    configuration = daemon_configuration(daemon)
     socket_path = daemon if configuration is None else configuration.sockets.unix.path
-    with ElapsedShown(for_s, clock) as shown:
+    with ElapsedShown(for_s, THIS_COMPUTER) as shown:
         feed = ReadingsFeed(
             lambda: connect(socket_path, max(_TIMEOUT_S, 3 / rate_hz)),
             None if burst is not None else rate_hz,
             shown.say,
-            clock,
+            THIS_COMPUTER,
         )
-        recorder = Recorder(name, *feed.first_messages, keeping, shown.say, clock, table_format, configuration)
+        recorder = Recorder(name, *feed.first_messages, keeping, shown.say, THIS_COMPUTER, table_format, configuration)
         recorder.start()
         try:
             recorder.follow(shown.show(feed.messages(for_s), lambda: f"{recorder.rows} rows"))
