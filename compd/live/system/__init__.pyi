@@ -1,5 +1,4 @@
 from .child_process import ChildProcess as ChildProcess
-from .datagrams import Datagrams as Datagrams
 from .events import name_event as name_event
 from .forked_process import OUT_OF_MEMORY as OUT_OF_MEMORY
 from .forked_process import ForkedProcess as ForkedProcess
