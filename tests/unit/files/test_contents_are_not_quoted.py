@@ -181,7 +181,7 @@ READERS: dict[str, Reader] = {
     "cycles": Reader(f"x{CYCLES_SUFFIX}", lambda path: list(RecordedCycles(path).cycles())),
     "plan": Reader("plan.csv", _problems(lambda path, problems: read_plan_file(path, 3, {}, problems))),
     "ball plate": Reader("plate.csv", _problems(read_plate)),
-    "machine zero": Reader(ZERO_NAME, lambda path: load_zero(path.parent, "", ("scale_1.position",))),
+    "machine zero": Reader(ZERO_NAME, lambda path: load_zero(path.parent, "", ("scale_1.position",), THIS_COMPUTER)),
     "last readings": Reader(LAST_NAME, _last_readings),
     "export": Reader("export.txt", _export(None)),
     **{f"export as {shape}": Reader("export.txt", _export(shape)) for shape in instrument_formats()},
