@@ -73,8 +73,9 @@ class QuantityTrust:
         self._i = i = memory.index[channel]
         self._limits = limits
         self._unit = memory.unit(i)
-        same = [j for j in range(memory.lengths, len(memory.channels)) if j != i and memory.unit(j) == self._unit]
-        self._neighbours = np.array(same, dtype=np.int64)
+        self._neighbours = [
+            j for j in range(memory.lengths, len(memory.channels)) if j != i and memory.unit(j) == self._unit
+        ]
         self._expected = math.nan  # follows the readings at the fastest change at most
         self._expected_s = math.nan
         self._implausible_s = 0.0
@@ -261,11 +262,14 @@ class QuantityTrust:
 
         A neighbour that is not believed has no voice.
         """
-        memory, places = self._memory, self._neighbours
-        speak = (memory.doubt[places] <= _LOST) & (time_s - memory.shown_s[places] < _OLD_S)
-        others = memory.shown[places][speak]
-        far = np.abs(others - value) > self._limits.apart
-        if 2 * far.sum() <= len(others) or far.sum() < _MIN_NEIGHBOURS:
+        memory = self._memory
+        others = [
+            memory.shown[j]
+            for j in self._neighbours
+            if memory.doubt[j] <= _LOST and time_s - memory.shown_s[j] < _OLD_S
+        ]
+        far = sum(abs(other - value) > self._limits.apart for other in others)
+        if 2 * far <= len(others) or far < _MIN_NEIGHBOURS:
             return None
         away = value - float(np.median(others))
         return _Fault(
