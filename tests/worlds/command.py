@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import hashlib
+import io
 import multiprocessing
 import random
 import sys
@@ -106,6 +107,8 @@ class Total:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Play worlds. Returns 1 where something did not hold that is not known."""
     options = _options(arguments)
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        sys.stdout.reconfigure(line_buffering=True)  # a run of hours says at once what does not hold
     if options.compare:
         return _compare(options)
     total, fails = Total(), 0
