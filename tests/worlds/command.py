@@ -220,6 +220,7 @@ def _tell(played: Played, options: argparse.Namespace) -> bool:
         FAILED.mkdir(parents=True, exist_ok=True)
         path = FAILED / f"{what}-{order.seed}.json"
         path.write_text(small.to_json(), encoding="utf-8")
+        play(small, record_to=path.with_suffix(""))
         kinds = ", ".join(event.name for event in small.events) or "no event"
         print(f"  {what}: {len(small.events)} of {len(report.plan.events)} events in {small.duration_s:.2f} s: {kinds}")
         print(f"  {path}")

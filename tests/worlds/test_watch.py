@@ -12,7 +12,7 @@ from scipy.stats import binom
 
 from compd.setpoint_states import State
 from tests.worlds.coverage import NO_FAULT, Case, Coverage, upper_limit
-from tests.worlds.invariants import mostly_valid, steady_correction, true_reason, within_bound
+from tests.worlds.invariants import mostly_valid, nothing_lost, steady_correction, true_reason, within_bound
 from tests.worlds.plan import Event
 from tests.worlds.recovery import Allowed, Recovery
 from tests.worlds.sight import Happening, Sight
@@ -110,6 +110,13 @@ def test_coverage_counts_and_adds_up() -> None:
     assert one.width_um(1.0) == pytest.approx(100.0, rel=0.06)
 
 
+def test_a_zero_that_was_taken_is_kept() -> None:
+    taken = {"scale_1.position": 1.0, "scale_2.position": 2.0}
+    assert not nothing_lost(taken, dict(taken))
+    assert "1 channels" in nothing_lost(taken, taken | {"scale_2.position": 0.0})
+    assert "2 channels" in nothing_lost(taken, {})
+
+
 def test_without_a_fault_nearly_all_is_valid() -> None:
     coverage = Coverage()
     for k in range(100):
@@ -122,25 +129,27 @@ TIMES = {"default": Allowed(1.0, True), "lines.cable": Allowed(3.0, True), "repl
 
 
 @pytest.mark.parametrize(
-    ("kind", "accepted_s", "late_s"),
+    ("kind", "accepted_s", "state", "late_s"),
     [
-        ("lines.cable", None, 13.0),
-        ("lines.cable", 12.0, 15.0),
-        ("replies.lost", 12.0, 11.0),
-        ("gauges.jump", None, 11.0),
+        ("lines.cable", None, State.STOP, 13.0),
+        ("lines.cable", None, State.FAULT, 18.0),
+        ("lines.cable", 12.0, State.FAULT, 15.0),
+        ("replies.lost", 12.0, State.FAULT, 11.0),
+        ("gauges.jump", None, State.REFUSED, 11.0),
     ],
 )
-def test_setpoints_are_valid_again_in_time(kind: str, accepted_s: float | None, late_s: float) -> None:
+def test_setpoints_are_valid_again_in_time(kind: str, accepted_s: float | None, state: State, late_s: float) -> None:
     def course(valid_from_s: float) -> list[str]:
         recovery = Recovery(TIMES)
         recovery.begins(happening(kind, ended_s=10.0))
         if accepted_s is not None:
             recovery.accepted(accepted_s)
-        states = [(10.0 + k / 4, State.OK if 10.0 + k / 4 >= valid_from_s else State.FAULT) for k in range(40)]
-        return [text for time_s, state in states if (text := recovery.late(sight(setpoint(time_s), state)))]
+        states = [(10.0 + k / 4, State.OK if 10.0 + k / 4 >= valid_from_s else state) for k in range(40)]
+        return [text for time_s, now in states if (text := recovery.late(sight(setpoint(time_s), now)))]
 
+    waits = state is State.FAULT and accepted_s is None
     assert not course(late_s)
-    assert len(course(late_s + 1.0)) == 1
+    assert len(course(late_s + 1.0)) == (0 if waits else 1)
 
 
 def test_nothing_is_late_while_a_fault_is_present() -> None:
