@@ -6,7 +6,6 @@ import contextlib
 import math
 import os
 import signal
-import socket
 import subprocess
 import sys
 import time
@@ -31,6 +30,7 @@ from tests.support.daemon_process import Daemon
 from tests.support.live_models import file_with
 from tests.support.paths import CONFIG
 from tests.support.patience import PATIENCE_S
+from tests.support.ports import free_port
 from tests.support.watching import Rules, Seen, Watcher, until
 
 TRIPOD = "tripod-cmm.yaml"
@@ -135,7 +135,7 @@ class InjectedMachine:
         self.truth = Truth(wires / "control.sock", self._truth_every_s)
         running.callback(self.truth.close)
         self._attacks = running.enter_context(ExitStack())
-        self._tcp = (LOOPBACK, _free_port())
+        self._tcp = (LOOPBACK, free_port())
         self.daemon = Daemon(self._write_configuration())
         running.callback(self.daemon.stop)
         self.daemon.__enter__()
@@ -282,8 +282,3 @@ def _takes_zero(client: Any) -> bool:
     except DaemonError:
         return False
     return True
-
-
-def _free_port() -> int:
-    with socket.create_server((LOOPBACK, 0)) as probe:
-        return int(probe.getsockname()[1])

@@ -265,7 +265,7 @@ def test_no_command_prints_anything_of_another_file(name: str, content: str, tmp
     assert_quotes_nothing(result.output + printed.getvalue() + str(result.exception))
 
 
-@settings(max_examples=50, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=50, suppress_health_check=[HealthCheck.too_slow, HealthCheck.function_scoped_fixture])
 @given(
     name=st.sampled_from(sorted(READERS)),
     pieces=st.lists(
