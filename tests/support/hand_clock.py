@@ -20,13 +20,8 @@ class HandClock(System):
         raise AssertionError("nothing waits while time stands")
 
 
-<<<<<<< HEAD
 class SteppedClock(System):
-    """The real clock, which a test can put forward."""
-=======
-class SteppedClock(MonotonicClock):
     """The real clock, which a test can put forward. reads : how often it was read."""
->>>>>>> load
 
     def __init__(self) -> None:
         self.ahead_s = 0.0

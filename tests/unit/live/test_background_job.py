@@ -11,8 +11,6 @@ from compd.live.service.zero_capture import BackgroundJob
 from compd.live.system import THIS_COMPUTER
 from tests.support.patience import PATIENCE_S
 
-TIMEOUT_S = 20
-
 
 def test_a_second_request_is_refused_while_the_first_is_worked_on():
     job = BackgroundJob("test", "one thing at a time", THIS_COMPUTER)
