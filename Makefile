@@ -14,7 +14,7 @@ BUILD_PACKAGES := import tomllib; project = tomllib.load(open("pyproject.toml", 
 # Where it is set, as in many containers, every start of Python takes twice as long.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: help gallery docs demo demo-linuxcnc live test long service pages pages-sample walks walks-sample hidden hidden-sample faults faults-sample lint pre-commit wheel deb bench bench-sample costs budget soak scoreboard sensitivity nightly clean
+.PHONY: help gallery docs demo demo-linuxcnc live test long service pages pages-sample walks walks-sample hidden hidden-sample faults faults-sample lint pre-commit wheel deb bench bench-sample costs budget worlds soak scoreboard sensitivity nightly clean
 .DEFAULT_GOAL := help
 
 help:
@@ -32,6 +32,7 @@ help:
 	@echo "make service the daemon under systemd in a container: sandbox, restart, watchdog, reload, stop (root; 3 min)"
 	@echo "make hidden  hidden causes are found, adopted, and the live error falls: on wires, four at a time (16 min)"
 	@echo "make faults  every fault at rest, in motion, restarted and under load, and 150 pairs, against the stated bound (40 min; continues)"
+	@echo "make worlds  the daemon, its machine and random faults in simulated time, from seeds (OPTIONS=\"--seed 7 --minutes 10\")"
 	@echo "make soak    a running daemon and random faults, held against the truth (4 min; OPTIONS=\"--minutes 60 --seed 7\")"
 	@echo "make bench   the benchmarks, as ratios (gcc and cyclictest are used where present)"
 	@echo "make costs   the README's table of what compd costs (cyclictest; half an hour, less with OPTIONS="--rounds 2 --rows 2000000")"
@@ -196,6 +197,10 @@ faults: $(STAMP)
 faults-sample: $(STAMP)
 	$(ONE_THREAD) $(BIN)/python -m tests.injection.cells --sample --fresh --out out/faults-sample.jsonl $(OPTIONS)
 
+# A failing seed has its line to repeat it: make worlds OPTIONS="--seed 7 --minutes 1 --rates campaign"
+worlds: $(STAMP)
+	$(ONE_THREAD) $(BIN)/python -m tests.worlds $(OPTIONS)
+
 # Faults, their order and places follow from the seed.
 soak: $(STAMP)
 	$(BIN)/python -m tests.soak $(OPTIONS)
@@ -237,6 +242,7 @@ docs: gallery
 # Hours of faults, and other examples of every fuzzer than yesterday's.
 nightly: lint wheel deb demo test pages walks long service hidden bench
 	$(MAKE) faults OPTIONS=--fresh
+	$(BIN)/python -m tests.worlds --fresh-for 600 --fresh-fails --jobs 2
 	for hour in 1 2 3; do $(BIN)/python -m tests.soak --minutes 60 --together 0.6 --seed $$(date +%j)$$hour || exit 1; done
 	$(BIN)/python -m tests.soak --without-faults --hours 24
 	COMPD_FUZZ=20 $(PYTEST) --timeout 1800 tests/fuzz

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import hashlib
+import io
 import multiprocessing
 import random
 import sys
@@ -17,6 +18,7 @@ from typing import NamedTuple
 
 import yaml
 
+from tests.worlds.compare import first_difference
 from tests.worlds.coverage import Coverage
 from tests.worlds.known import Known, known_worlds
 from tests.worlds.plan import Plan, draw
@@ -105,6 +107,10 @@ class Total:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Play worlds. Returns 1 where something did not hold that is not known."""
     options = _options(arguments)
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        sys.stdout.reconfigure(line_buffering=True)  # a run of hours says at once what does not hold
+    if options.compare:
+        return _compare(options)
     total, fails = Total(), 0
     for played in _played(options):
         total.add(played)
@@ -116,6 +122,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print("not played, because this World has no such part: " + ", ".join(f"{k} {n}" for k, n in skipped.items()))
     print(total.line())
     return 1 if fails and not (options.fresh_for and not options.fresh_fails) else 0
+
+
+def _compare(options: argparse.Namespace) -> int:
+    """Compare each seed with kernels for any processor. Returns 1 where a setpoint differs."""
+    differ = 0
+    for order in _orders(options):
+        difference = first_difference(order.plan)
+        differ += difference is not None
+        print(f"{order.line}: {difference or 'the same setpoints'}")
+    return 1 if differ else 0
 
 
 def _options(arguments: Sequence[str] | None) -> argparse.Namespace:
@@ -204,6 +220,7 @@ def _tell(played: Played, options: argparse.Namespace) -> bool:
         FAILED.mkdir(parents=True, exist_ok=True)
         path = FAILED / f"{what}-{order.seed}.json"
         path.write_text(small.to_json(), encoding="utf-8")
+        play(small, record_to=path.with_suffix(""))
         kinds = ", ".join(event.name for event in small.events) or "no event"
         print(f"  {what}: {len(small.events)} of {len(report.plan.events)} events in {small.duration_s:.2f} s: {kinds}")
         print(f"  {path}")

@@ -12,8 +12,8 @@ from pathlib import Path
 from compd.simulation.truth.motion import Drives
 from tests.worlds.coverage import NO_FAULT, Coverage
 from tests.worlds.faults import begin
-from tests.worlds.faults.fault import mend, present
-from tests.worlds.invariants import mostly_valid
+from tests.worlds.faults.fault import Fault, mend, present
+from tests.worlds.invariants import mostly_valid, nothing_lost
 from tests.worlds.machines import fast, machine_file, measured_errors
 from tests.worlds.plan import Event, Plan
 from tests.worlds.rates import kinds
@@ -48,17 +48,23 @@ class Report:
 
 
 def play(
-    plan: Plan, hear: Callable[[Sight], object] | None = None, until: Callable[[Watch], bool] = lambda watch: False
+    plan: Plan,
+    hear: Callable[[Sight], object] | None = None,
+    until: Callable[[Watch], bool] = lambda watch: False,
+    record_to: Path | None = None,
 ) -> Report:
     """Play a plan.
 
-    hear : called with every setpoint. until : ends the world early; asked after every step.
+    hear : called with every setpoint. until : ends the world early; asked after every step. record_to : folder for a
+    recording, where the World has a recorder.
     """
     with tempfile.TemporaryDirectory() as directory:
         path = machine_file(plan.machine, Path(directory))
         drives = Drives(_MM_PER_S, plan.mm_per_s2)
         change = partial(fast, mm_per_s2=plan.mm_per_s2)
         with built(path, plan.seed, drives, change, measured_errors) as world:
+            if record_to is not None and hasattr(world, "record"):
+                world.record(record_to)
             return _Play(plan, world, hear).run(until)
 
 
@@ -71,6 +77,8 @@ class _Play:
         self._skipped: Counter[str] = Counter()
         self._asked = 0
         self._began_s = world.hub.now_s
+        self._zero = dict(world.zero.readings_mm)
+        self._taking: list[Fault] = []
 
     def run(self, until: Callable[[Watch], bool]) -> Report:
         plan, watch = self._plan, self._watch
@@ -104,12 +112,22 @@ class _Play:
         while (left_s := self._began_s + time_s - world.hub.now_s) > 0 and not until(watch):
             world.run(min(left_s, LOOKS_EVERY_S))
             world.forget()
+            self._look_at_zero()
             if watch.asks_for_s >= ACTS_AFTER_S:
                 self._asked += 1
                 mend(world)
                 world.run(ACCEPTS_AFTER_S)
                 world.accept()
                 watch.accepted()
+
+    def _look_at_zero(self) -> None:
+        """Compare the machine zero that is used with the one that was taken last."""
+        used = dict(self._world.zero.readings_mm)
+        if self._taking:
+            self._taking = [fault for fault in self._taking if fault.present]
+        elif text := nothing_lost(self._zero, used):
+            self._watch.note("nothing_lost", self._blame(), text)
+        self._zero = used
 
     def _begin(self, event: Event) -> None:
         try:
@@ -119,6 +137,8 @@ class _Play:
                 raise
             self._skipped[event.name] += 1
             return
+        if event.name == "persons.zero":
+            self._taking.append(fault)
         self._watch.begins(Happening(event, fault, event.name not in _WORK))
 
     def _blame(self) -> str:
