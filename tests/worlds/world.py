@@ -34,6 +34,7 @@ from compd.plugins import SIMULATED_GAUGES
 from compd.plugins import load as load_plugin
 from compd.setpoint_states import Mode, State
 from compd.simulation import World as Truth
+from compd.simulation.truth.cause import Cause
 from compd.simulation.truth.motion import DRIVES, Drives
 from compd.simulation.truth.strengths import Strengths
 from compd.simulation.wires.server import STEP_S, LiveWorld, Sensing
@@ -145,9 +146,12 @@ class World:
         self._to_close.remove(daemon)
 
     def kill(self, process: str) -> None:
-        """SIGKILL for a process of the daemon."""
+        """SIGKILL for a process of the daemon; the others end with the supervisor, which is started anew."""
         for name in self._named(process):
             self.system.processes[name].kill()
+        if process == SUPERVISOR and self._on:
+            self.stop()
+            self.hub.at(self.hub.now_s + RESTART_S, self.start)
 
     def kill_acquisition(self) -> None:
         """End the process that polls the gauges."""
@@ -167,10 +171,14 @@ class World:
             name for name, process in self.system.processes.items() if process.running and not name.startswith("client")
         ]
 
-    def restart(self) -> None:
-        """A person restarts the unit."""
+    def end(self) -> None:
+        """A person stops the unit."""
         self._on = False
         self.system.send_signal(signal.SIGTERM)
+
+    def restart(self) -> None:
+        """A person restarts the unit."""
+        self.end()
         self.hub.at(self.hub.now_s + 2.0, self.start)
 
     def reload(self, change: Callable[[dict[str, Any]], None] = lambda document: None) -> None:
@@ -312,10 +320,11 @@ def built(
     drives: Drives = DRIVES,
     change: Callable[[dict[str, Any]], None] = lambda document: None,
     strengths: Callable[[Configuration], Strengths | None] = lambda configuration: None,
+    causes: Callable[[Configuration], Sequence[Cause]] = lambda configuration: (),
 ) -> Iterator[World]:
     """A world of a configuration, at machine zero, ready.
 
-    change : of its document before it is loaded. strengths : of the errors of the machine.
+    change : of its document before it is loaded. strengths : of the errors of the machine. causes : beside them.
     """
     random.seed(seed)
     with ExitStack() as stack:
@@ -323,16 +332,21 @@ def built(
         stack.callback(shutil.rmtree, directory, ignore_errors=True)
         document = deepcopy(read_document(path).data)
         change(document)
-        document["state"] = {"directory": str(directory / "state")}
+        document["state"] = {**document.get("state", {}), "directory": str(directory / "state")}
         sockets = document.setdefault("sockets", {})
         sockets["unix"] = {"path": str(directory / "socket")}
         for other in ("tcp", "udp"):
             sockets.pop(other, None)
         (directory / path.name).write_text(yaml.safe_dump(document, sort_keys=False))
         configuration = load(directory / path.name)
-        errors = strengths(configuration)
         truth = Truth(
-            configuration.geometry, configuration.wiring, seed, zero_hold_s=1e9, strengths=errors, drives=drives
+            configuration.geometry,
+            configuration.wiring,
+            seed,
+            zero_hold_s=1e9,
+            strengths=strengths(configuration),
+            causes=causes(configuration),
+            drives=drives,
         )
         hub = Hub(seed)
         world = World(hub, configuration, truth, directory)
