@@ -240,17 +240,9 @@ docs: gallery
 	@echo "docs/_build/html/index.html"
 
 # Hours of faults, and other examples of every fuzzer than yesterday's.
-<<<<<<< HEAD
-nightly: lint wheel deb demo test pages walks long service hidden bench
-	$(MAKE) faults OPTIONS=--fresh
-	$(BIN)/python -m tests.worlds --fresh-for 600 --fresh-fails --jobs 2
-	for hour in 1 2 3; do $(BIN)/python -m tests.soak --minutes 60 --together 0.6 --seed $$(date +%j)$$hour || exit 1; done
-	$(BIN)/python -m tests.soak --without-faults --hours 24
-=======
 nightly: lint wheel deb demo test pages walks long service hidden bench faults
 	$(ONE_THREAD) $(BIN)/python -m tests.worlds --fresh-for 3600 --fresh-fails --jobs 2
 	$(BIN)/python -m tests.soak --hours 24
->>>>>>> matrix
 	COMPD_FUZZ=20 $(PYTEST) --timeout 1800 tests/fuzz
 	$(MAKE) scoreboard
 

@@ -6,12 +6,6 @@ import contextlib
 import math
 import os
 import signal
-<<<<<<< HEAD
-import subprocess
-import sys
-=======
-import socket
->>>>>>> matrix
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
@@ -37,25 +31,8 @@ from tests.injection.machine import (
 from tests.injection.truth import PREFERRED, Truth
 from tests.support.daemon_process import Daemon
 from tests.support.paths import CONFIG
-<<<<<<< HEAD
-from tests.support.patience import PATIENCE_S
 from tests.support.ports import free_port
-from tests.support.watching import Rules, Seen, Watcher, until
-
-TRIPOD = "tripod-cmm.yaml"
-RATE_HZ = 100.0
-# What an owner adds to the shipped configuration, so that the gauges are compared with each other.
-VOTES = {
-    "joint_pair_um": 30.0,
-    "tip_mm_per_s": 200.0,
-    "frame": {"temperature": "temperature_frame_degC", "expansion_ppm_per_K": 10.5, "tolerance_um": 15.0},
-}
-MACHINE_ZERO = "machine-zero.json"
-# Steel.
-EXPANSION, EXPANSION_PPM_PER_K = "link_expansion", 11.5
-=======
 from tests.support.watching import Seen, Watcher, until
->>>>>>> matrix
 
 
 class RealMachine(Machine):

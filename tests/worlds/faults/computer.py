@@ -5,11 +5,7 @@ from __future__ import annotations
 import random
 
 from tests.worlds.faults.fault import Fault
-<<<<<<< HEAD
-from tests.worlds.faults.layers import delay
-=======
-from tests.worlds.faults.layers import disturb
->>>>>>> matrix
+from tests.worlds.faults.layers import delay, disturb
 from tests.worlds.hub import usually_late
 from tests.worlds.wires import lost, whole
 from tests.worlds.world import ACQUISITION, LOOP, SERVICE, World
