@@ -45,7 +45,8 @@ _PLACEHOLDERS = (9.9e37, 9.91e37, 3.4028235e38, 1.7976931348623157e308, 9.969209
 
 def stands_for_no_number(value: float) -> bool:
     """Whether a number is one that instruments send in place of a reading: SCPI's 9.9E37, 9.91E37 and their kind."""
-    return any(math.isclose(abs(value), placeholder, rel_tol=1e-4) for placeholder in _PLACEHOLDERS)
+    size = abs(value)
+    return size >= LARGEST_READING and any(math.isclose(size, other, rel_tol=1e-4) for other in _PLACEHOLDERS)
 
 
 def is_reading(value: float) -> bool:

@@ -15,8 +15,14 @@ from _pytest.runner import runtestprotocol
 
 from tests.support.pauses import MATTERS_S, Pauses
 
-# Every run tries the same examples, or others with COMPD_FUZZ; none has a time limit: the computer may pause.
-hypothesis.settings.register_profile("compd", deadline=None, derandomize="COMPD_FUZZ" not in os.environ)
+# Every run tries the same examples, or others with COMPD_FUZZ. The computer may be busy: neither an example nor its
+# making has a time limit.
+hypothesis.settings.register_profile(
+    "compd",
+    deadline=None,
+    derandomize="COMPD_FUZZ" not in os.environ,
+    suppress_health_check=[hypothesis.HealthCheck.too_slow],
+)
 hypothesis.settings.load_profile("compd")
 
 _TRIES = 4

@@ -106,7 +106,7 @@ class Daemon:
         try_model(pipeline.settings.model, pipeline.loader.without_effects.quantities, str(configuration.path))
         sockets = configuration.sockets
         access = TcpAccess.of(sockets.tcp)
-        packets = UdpSender(sockets.udp) if sockets.udp is not None else None
+        packets = UdpSender(sockets.udp, system) if sockets.udp is not None else None
         try:
             self.listeners: Listeners = Listeners(sockets, None if before is None else before.listeners)
         except DaemonError:

@@ -8,7 +8,7 @@ from compd.configuration import Configuration
 from compd.errors import CompdError
 from compd.live.daemon import Daemon
 from compd.live.supervisor import Ending, Supervisor
-from compd.live.system import THIS_COMPUTER, Journal, Notifier, System, name_event
+from compd.live.system import THIS_COMPUTER, System, name_event
 from compd.log import hide_secrets_of_libraries, log_to_stderr
 from compd.machine_check import load_whole
 from compd.text import hide_secrets
@@ -21,13 +21,13 @@ def run(configuration: Configuration) -> bool:
 
     Raises CompdError where it cannot start: a socket that cannot be had, a model file that cannot be used.
     """
-    _log_to_stderr()
+    _log_to_stderr(THIS_COMPUTER)
     return run_daemon(configuration, THIS_COMPUTER)
 
 
 def run_daemon(configuration: Configuration, system: System) -> bool:
     """Run the daemon on a computer; see `run`."""
-    notifier = Notifier.from_environment()
+    notifier = system.notifier()
     daemon = Daemon(configuration, system=system)
     while True:
         _report(daemon)
@@ -80,10 +80,10 @@ def _report(daemon: Daemon) -> None:
     )
 
 
-def _log_to_stderr() -> None:
+def _log_to_stderr(system: System) -> None:
     """Log one line per event to stderr, with colours on a terminal; under systemd an entry of the journal."""
     hide_secrets_of_libraries()
-    if (journal := Journal.from_environment()) is None:
+    if (journal := system.journal()) is None:
         log_to_stderr([name_event])
         return
     named = [structlog.processors.add_log_level, name_event]

@@ -28,8 +28,7 @@ def page() -> str:
     states = [
         [
             f"`{state}`",
-            f"{state.code}, {'valid' if state.valid else 'invalid'}",
-            state.text,
+            f"{state.code}, {'valid' if state.valid else 'invalid'}: {state.text}",
             state.left,
             _ends(state_within_s(configuration, state), state_within_s(configuration, state, moving=True)),
         ]
@@ -39,8 +38,7 @@ def page() -> str:
         [
             end.cause.text,
             ", ".join(f"`{state}`" for state in end.states),
-            _seconds(within_s(configuration, end.cause)),
-            _seconds(within_s(configuration, end.cause, moving=True)),
+            _ends([within_s(configuration, end.cause)], [within_s(configuration, end.cause, moving=True)]),
             end.rule,
         ]
         for end in ENDS
@@ -48,17 +46,17 @@ def page() -> str:
     return join(
         "# States of a setpoint",
         INTRODUCTION,
-        table(["state", "code", "meaning", "how it is left", "ends within"], states),
+        table(["state", "code and meaning", "how it is left", "ends within"], states),
         heading(2, "When a state ends", "states-ends"),
         BY_CAUSE,
-        table(["what has ended", "states", "at rest", "moved", "follows from"], causes),
+        table(["what has ended", "states", "ends within", "follows from"], causes),
     )
 
 
 def _ends(rest_s: Sequence[float], moving_s: Sequence[float]) -> str:
-    """A cell of the table of states; "" for a state without a cause."""
+    """A cell: times of a machine at rest, and of one that has moved where they differ."""
     rest, moving = _span(rest_s), _span(moving_s)
-    return rest if rest == moving else f"{rest}; moved: {moving}"
+    return (rest if rest == moving else f"{rest}; moved: {moving}") or "-"
 
 
 def _span(times_s: Sequence[float]) -> str:

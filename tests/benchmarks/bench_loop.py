@@ -32,6 +32,7 @@ from compd.live import daemon as daemon_module
 from compd.live.loop.timing import BIN_US
 from compd.live.machine import MachineZero
 from compd.live.memory import Latest
+from compd.live.system import THIS_COMPUTER
 from compd.operation_settings import SocketSettings, StateSettings
 from tests.benchmarks.figures import quiet, show
 from tests.benchmarks.limits import first_good, run_limited
@@ -148,7 +149,7 @@ def configuration(directory: Path, rate_hz: float) -> Configuration:
         {quantity.name: RAW_AT_ZERO_MM for quantity in loaded.wiring.quantities},
     )
     (directory / "state").mkdir()
-    zero.save(directory / "state")
+    zero.save(directory / "state", THIS_COMPUTER)
     return replace(
         loaded,
         loop=loaded.loop.model_copy(update={"rate_hz": rate_hz, "priority": PRIORITY, "stale_after_s": 1e6}),

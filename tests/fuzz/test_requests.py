@@ -16,8 +16,10 @@ from compd.errors import StateError
 from compd.live.loop import Commands
 from compd.live.service import Errands, Messages, RequestContext, Requests, TargetKeys
 from compd.live.service.client_session import ClientSession
+from compd.live.service.descriptor_bin import DescriptorBin
 from compd.live.service.messages import MAX_NUMBER, ErrorCode, ProtocolError
 from compd.live.service.requests import REQUESTS, SENT_MESSAGES
+from compd.live.system import THIS_COMPUTER
 from tests.fuzz.bounds import examples
 
 # Answered by the next setpoint, or later.
@@ -59,6 +61,7 @@ def requests(tip: str, rotation: bool) -> Requests:
     commands = Commands(StateError.of("zero", "none"))
     return Requests(
         RequestContext(
+            clock=THIS_COMPUTER,
             messages=Messages(
                 version={
                     "class": "VERSION",
@@ -100,7 +103,7 @@ def test_every_line_has_an_answer_an_error_or_a_documented_silence(
     ends: tuple[socket.socket, socket.socket], lines: list[bytes], local: bool, tip: str, rotation: bool
 ) -> None:
     asked = requests(tip, rotation)
-    client = ClientSession(ends[0], "somebody", local)
+    client = ClientSession(ends[0], "somebody", local, DescriptorBin(THIS_COMPUTER))
     for data in lines:
         answer = answer_or_error(asked, client, data)
         if not answer:
@@ -126,7 +129,7 @@ def test_any_stream_of_bytes_is_lines_and_errors(pieces: list[bytes]) -> None:
     """However the bytes arrive; what is too long is skipped up to its end, and the next line is read."""
     one, other = socket.socketpair()
     with one, other:
-        client = ClientSession(one, "somebody", local=True)
+        client = ClientSession(one, "somebody", local=True, unwanted=DescriptorBin(THIS_COMPUTER))
         received: list[bytes | ProtocolError] = []
         for piece in [*pieces, b'\n{"class":"VERSION"}\n']:
             other.sendall(piece)

@@ -9,6 +9,7 @@ import pytest
 from compd.comparison import open_recording
 from compd.configuration import load
 from compd.live.machine import load_zero
+from compd.live.system import THIS_COMPUTER
 from compd.machine_builder import build_model
 from compd.model_file import read_model_file
 from tests.support.live_machine import Machine
@@ -28,7 +29,7 @@ def test_its_configurations_are_machines(machine: str) -> None:
 
 def test_its_machine_zero_is_still_that_of_its_configuration() -> None:
     live = Machine(load(FILES / "tripod-cmm.yaml"))
-    zero = load_zero(FILES / "zero.d", live.configuration.zero_hash, live.wires.length_channels)
+    zero = load_zero(FILES / "zero.d", live.configuration.zero_hash, live.wires.length_channels, THIS_COMPUTER)
     assert zero.readings_mm == dict.fromkeys(live.wires.length_channels, 12.5)
 
 

@@ -15,6 +15,7 @@ from compd.comparison import open_recording
 from compd.configuration import load
 from compd.live.machine import load_zero
 from compd.live.record import RecordedCycles, differing_cells, replay_cycles
+from compd.live.system import THIS_COMPUTER
 from compd.machine_builder import build_model
 from compd.model_file import read_model_file
 from tests.support.live_machine import Machine
@@ -29,7 +30,9 @@ def test_its_configurations_and_machine_zeros_belong_together(machine):
     # their frame comparators and thermometers state no range, of which no release before this one warned
     assert all("no range is stated" in warning.what for warning in live.configuration.warnings)
     assert build_model(live.configuration.geometry, live.configuration.wiring).links == LINKS[machine]
-    zero = load_zero(FILES / f"{machine}-zero.d", live.configuration.zero_hash, live.wires.length_channels)
+    zero = load_zero(
+        FILES / f"{machine}-zero.d", live.configuration.zero_hash, live.wires.length_channels, THIS_COMPUTER
+    )
     assert zero.readings_mm == dict.fromkeys(live.wires.length_channels, 12.5)
 
 

@@ -6,7 +6,6 @@ import contextlib
 import math
 import os
 import signal
-import socket
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
@@ -33,6 +32,7 @@ from tests.injection.machine import (
 from tests.injection.truth import PREFERRED, Truth
 from tests.support.daemon_process import Daemon
 from tests.support.paths import CONFIG
+from tests.support.ports import free_port
 from tests.support.watching import Seen, Watcher, until
 
 
@@ -66,7 +66,7 @@ class RealMachine(Machine):
         self.truth = Truth(wires / "control.sock")
         running.callback(self.truth.close)
         self._attacks = running.enter_context(ExitStack())
-        self._tcp = (LOOPBACK, _free_port())
+        self._tcp = (LOOPBACK, free_port())
         self.daemon = Daemon(self._write_configuration())
         running.callback(self.daemon.stop)
         self.daemon.__enter__()
@@ -196,8 +196,3 @@ def _takes_zero(client: Any) -> bool:
     except DaemonError:
         return False
     return True
-
-
-def _free_port() -> int:
-    with socket.create_server((LOOPBACK, 0)) as probe:
-        return int(probe.getsockname()[1])

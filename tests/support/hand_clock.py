@@ -21,12 +21,14 @@ class HandClock(System):
 
 
 class SteppedClock(System):
-    """The real clock, which a test can put forward."""
+    """The real clock, which a test can put forward. reads : how often it was read."""
 
     def __init__(self) -> None:
         self.ahead_s = 0.0
+        self.reads = 0
 
     def monotonic(self) -> float:
+        self.reads += 1
         return super().monotonic() + self.ahead_s
 
     def step(self, step_s: float) -> None:

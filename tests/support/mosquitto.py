@@ -6,7 +6,6 @@ import base64
 import hashlib
 import shutil
 import signal
-import socket
 import subprocess
 import threading
 from collections.abc import Iterator
@@ -18,6 +17,7 @@ from paho.mqtt.client import Client
 from paho.mqtt.enums import CallbackAPIVersion
 
 from tests.support.patience import PATIENCE_S
+from tests.support.ports import free_port
 
 MOSQUITTO = shutil.which("mosquitto", path="/usr/sbin:/usr/local/sbin:/usr/bin:/usr/local/bin")
 needs_mosquitto = pytest.mark.skipif(MOSQUITTO is None, reason="mosquitto is not installed: apt install mosquitto")
@@ -28,9 +28,7 @@ class Broker:
 
     def __init__(self, directory: Path, settings: str = "allow_anonymous true") -> None:
         """`settings`: further lines of mosquitto's configuration."""
-        with socket.socket() as probe:
-            probe.bind(("127.0.0.1", 0))
-            self.port: int = probe.getsockname()[1]
+        self.port = free_port()
         self._file = directory / "mosquitto.conf"
         self._file.write_text(f"listener {self.port} 127.0.0.1\nuser root\n{settings}\n")
         self._process: subprocess.Popen[str] | None = None
@@ -94,6 +92,7 @@ class Publisher:
     def close(self) -> None:
         self._client.disconnect()
         self._client.loop_stop()
+        self._client.reinitialise()  # closes the two sockets that wake its thread
 
 
 def hashed(user: str, password: str) -> str:

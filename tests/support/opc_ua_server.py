@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import logging
-import socket
 import threading
 from collections.abc import Coroutine, Iterator
 from contextlib import contextmanager
@@ -20,6 +19,7 @@ from asyncua.server.user_managers import UserManager
 
 from tests.support.certificates import Certificate
 from tests.support.patience import PATIENCE_S
+from tests.support.ports import free_port
 
 NAMESPACE = "http://compd.example/probes"
 NAMESPACE_INDEX = 2  # the first that a server gives
@@ -48,9 +48,7 @@ class OpcUaServer:
     """Nodes ns=2;s=NAME with values, statuses and times that a test writes."""
 
     def __init__(self, users: UserManager | None = None, security: Security | None = None) -> None:
-        with socket.socket() as probe:
-            probe.bind(("127.0.0.1", 0))
-            self.endpoint = f"opc.tcp://127.0.0.1:{probe.getsockname()[1]}/probes"
+        self.endpoint = f"opc.tcp://127.0.0.1:{free_port()}/probes"
         self._users = users
         self._security = security
         self._runner = asyncio.Runner(loop_factory=asyncio.new_event_loop)

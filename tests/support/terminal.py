@@ -8,7 +8,6 @@ import re
 import shlex
 import shutil
 import signal
-import socket
 import subprocess
 import sys
 import threading
@@ -20,6 +19,7 @@ from typing import NamedTuple
 from compd.client import connect
 from compd.demo.machine_zero import wait_for_gauges
 from tests.support.paths import CONFIG, ROOT
+from tests.support.ports import free_port
 from tests.support.simulated import HEXAPOD, TRIPOD, made_patient
 from tests.support.staging import make_stage, staged
 
@@ -104,8 +104,7 @@ class Terminal:
         shutil.copytree(CONFIG, directory / "config")
         for machine in (TRIPOD, HEXAPOD):
             (directory / "config" / machine.name).write_text(made_patient(machine.read_text()))
-        with socket.create_server(("127.0.0.1", 0)) as probe:
-            self._broker_port = str(probe.getsockname()[1])
+        self._broker_port = str(free_port())
 
     def run(self, console: str) -> None:
         """Run a console fence."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import hashlib
+import io
 import multiprocessing
 import random
 import sys
@@ -106,6 +107,8 @@ class Total:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Play worlds. Returns 1 where something did not hold that is not known."""
     options = _options(arguments)
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        sys.stdout.reconfigure(line_buffering=True)  # a run of hours says at once what does not hold
     if options.compare:
         return _compare(options)
     total, fails = Total(), 0
@@ -217,6 +220,7 @@ def _tell(played: Played, options: argparse.Namespace) -> bool:
         FAILED.mkdir(parents=True, exist_ok=True)
         path = FAILED / f"{what}-{order.seed}.json"
         path.write_text(small.to_json(), encoding="utf-8")
+        play(small, record_to=path.with_suffix(""))
         kinds = ", ".join(event.name for event in small.events) or "no event"
         print(f"  {what}: {len(small.events)} of {len(report.plan.events)} events in {small.duration_s:.2f} s: {kinds}")
         print(f"  {path}")

@@ -15,7 +15,6 @@ from typing import IO, NamedTuple
 
 import numpy as np
 
-from compd.setpoint_states import State
 from tests.worlds.plan import Plan
 from tests.worlds.run import play
 from tests.worlds.sight import Sight
@@ -105,7 +104,7 @@ def _row(sight: Sight) -> Row:
         values = setpoint.values
         lengths = (values.tip_M_mm, values.link_length_mm, values.scale_setpoint_mm, values.correction_mm)
         numbers = (*np.concatenate(lengths).tolist(), 1e-3 * told.u_tip_um)
-    return Row(setpoint.seq, told.time_s, State(told.state).value, numbers)
+    return Row(setpoint.seq, told.time_s, told.state.value, numbers)
 
 
 def main() -> None:

@@ -1,7 +1,8 @@
 """What must hold in every world: each a function that says what does not hold, and "" where it holds.
 
-Of each setpoint: `within_bound`, `steady_correction`, `true_reason`. Of a whole world: `mostly_valid`, and what
-`tests.worlds.recovery` and `tests.worlds.run` see of its course.
+Of each setpoint: `within_bound`, `steady_correction`, `true_reason`. Of a world between two of its events:
+`nothing_lost`; of a whole world: `mostly_valid`. `tests.worlds.recovery` has the times after faults, and
+`tests.worlds.run` sees tracebacks.
 """
 
 from __future__ import annotations
@@ -71,6 +72,17 @@ def named_in(reason: str, configuration: Configuration) -> set[str]:
 OF_SETPOINTS: Mapping[str, Invariant] = {
     invariant.__name__: invariant for invariant in (within_bound, steady_correction, true_reason)
 }
+
+
+def nothing_lost(taken: Mapping[str, float], used: Mapping[str, float]) -> str:
+    """The machine zero that a person took last is used, whatever was killed, restarted or reloaded since.
+
+    taken, used : readings at machine zero by channel, mm.
+    """
+    if taken == used:
+        return ""
+    channels = sorted(name for name in {*taken, *used} if taken.get(name) != used.get(name))
+    return f"machine zero of {len(channels)} channels is not the one that was taken last: {', '.join(channels[:5])}"
 
 
 def mostly_valid(coverage: Coverage, without_faults: bool) -> str:

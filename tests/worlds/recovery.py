@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import yaml
 
+from compd.setpoint_states import State
 from tests.worlds.sight import Happening, Sight
 
 FILE = Path(__file__).with_name("back_within.yaml")
@@ -39,8 +40,8 @@ class Recovery:
             self._accepted_s = None
 
     def accepted(self, now_s: float) -> None:
-        """A person has looked. A second look after the same fault gives no further time."""
-        if self._accepted_s is None:
+        """A person has looked. A second look after the end of the same faults gives no further time."""
+        if self._accepted_s is None and not any(happening.fault.present for happening in self._awaited):
             self._accepted_s = now_s
 
     def late(self, sight: Sight) -> str:
@@ -52,8 +53,10 @@ class Recovery:
             return ""
         rows = [self._times.get(one.event.name, self._times["default"]) for one in self._awaited]
         ended_s = max(happening.fault.ended_s for happening in self._awaited)
-        if self._accepted_s is not None and any(row.person for row in rows):
-            ended_s = max(ended_s, self._accepted_s)
+        if any(row.person for row in rows):
+            if self._accepted_s is None and sight.told.state is State.FAULT:
+                return ""  # the person is on the way
+            ended_s = max(ended_s, self._accepted_s or 0.0)
         within_s = max(row.within_s for row in rows)
         if sight.told.time_s <= ended_s + within_s:
             return ""

@@ -9,11 +9,14 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
+from compd.configuration import load
 from compd.simulation.truth.motion import Drives
+from tests.worlds.blindness import Blindness, listening
+from tests.worlds.clients import Recording
 from tests.worlds.coverage import NO_FAULT, Coverage
 from tests.worlds.faults import begin
-from tests.worlds.faults.fault import mend, present
-from tests.worlds.invariants import mostly_valid
+from tests.worlds.faults.fault import Fault, mend, present
+from tests.worlds.invariants import mostly_valid, nothing_lost
 from tests.worlds.machines import fast, machine_file, measured_errors
 from tests.worlds.plan import Event, Plan
 from tests.worlds.rates import kinds
@@ -25,6 +28,8 @@ from tests.worlds.world import World, built
 LOOKS_EVERY_S, ACTS_AFTER_S = 0.25, 3.0
 # From the repair of gauges to their acceptance, s.
 ACCEPTS_AFTER_S = 0.5
+# Until the files of a recording are closed, s.
+RECORDED_WITHIN_S = 1.0
 # Speed of the drives before the first event, mm/s.
 _MM_PER_S = 50.0
 _WORK = {f"{kind.family}.{kind.name}" for kind in kinds() if not kind.fault}
@@ -48,43 +53,57 @@ class Report:
 
 
 def play(
-    plan: Plan, hear: Callable[[Sight], object] | None = None, until: Callable[[Watch], bool] = lambda watch: False
+    plan: Plan,
+    hear: Callable[[Sight], object] | None = None,
+    until: Callable[[Watch], bool] = lambda watch: False,
+    record_to: Path | None = None,
 ) -> Report:
     """Play a plan.
 
-    hear : called with every setpoint. until : ends the world early; asked after every step.
+    hear : called with every setpoint. until : ends the world early; asked after every step. record_to : path of a
+    recording without its suffix; the machine's file is put beside it.
     """
     with tempfile.TemporaryDirectory() as directory:
         path = machine_file(plan.machine, Path(directory))
         drives = Drives(_MM_PER_S, plan.mm_per_s2)
         change = partial(fast, mm_per_s2=plan.mm_per_s2)
         with built(path, plan.seed, drives, change, measured_errors) as world:
-            return _Play(plan, world, hear).run(until)
+            blindness = Blindness.of(world.configuration)
+            with listening(blindness):
+                return _Play(plan, world, blindness, hear).run(until, record_to)
+
+
+def _recording(world: World, name: Path) -> Recording:
+    """Record the world, with its machine's file beside the recording."""
+    machine = name.with_name(f"{name.name}.machine.yaml")
+    machine.write_text(world.configuration.path.read_text())
+    return world.clients.record(name, load(machine))
 
 
 class _Play:
     """One plan in its world."""
 
-    def __init__(self, plan: Plan, world: World, hear: Callable[[Sight], object] | None) -> None:
+    def __init__(self, plan: Plan, world: World, blindness: Blindness, hear: Callable[[Sight], object] | None) -> None:
         self._plan, self._world = plan, world
-        self._watch = Watch(world, hear_also=hear)
+        self._watch = Watch(world, blindness, hear_also=hear)
         self._skipped: Counter[str] = Counter()
         self._asked = 0
         self._began_s = world.hub.now_s
+        self._zero = dict(world.zero.readings_mm)
+        self._taking: list[Fault] = []
 
-    def run(self, until: Callable[[Watch], bool]) -> Report:
-        plan, watch = self._plan, self._watch
-        try:
-            for event in plan.events:
-                self._until(event.time_s, until)
-                if until(watch):
-                    break
-                self._begin(event)
-            self._until(plan.duration_s, until)
-        except AssertionError:
-            if not self._world.died:
-                raise
-            watch.note("no_traceback", self._blame(), self._world.died[0])
+    def run(self, until: Callable[[Watch], bool], record_to: Path | None = None) -> Report:
+        plan, watch, world = self._plan, self._watch, self._world
+        recording = None if record_to is None else _recording(world, record_to)
+        for event in plan.events:
+            self._until(event.time_s, until)
+            if until(watch):
+                break
+            self._begin(event)
+        self._until(plan.duration_s, until)
+        if recording is not None:
+            recording.end()
+            world.run(RECORDED_WITHIN_S)
         without_faults = all(event.name in _WORK for event in plan.events)
         if text := mostly_valid(watch.coverage, without_faults):
             watch.note("mostly_valid", NO_FAULT, text)
@@ -104,12 +123,24 @@ class _Play:
         while (left_s := self._began_s + time_s - world.hub.now_s) > 0 and not until(watch):
             world.run(min(left_s, LOOKS_EVERY_S))
             world.forget()
+            if world.died:
+                watch.note("no_traceback", self._blame(), world.died[-1])
+            self._look_at_zero()
             if watch.asks_for_s >= ACTS_AFTER_S:
                 self._asked += 1
                 mend(world)
                 world.run(ACCEPTS_AFTER_S)
                 world.accept()
                 watch.accepted()
+
+    def _look_at_zero(self) -> None:
+        """Compare the machine zero that is used with the one that was taken last."""
+        used = dict(self._world.zero.readings_mm)
+        if self._taking:
+            self._taking = [fault for fault in self._taking if fault.present]
+        elif text := nothing_lost(self._zero, used):
+            self._watch.note("nothing_lost", self._blame(), text)
+        self._zero = used
 
     def _begin(self, event: Event) -> None:
         try:
@@ -119,6 +150,8 @@ class _Play:
                 raise
             self._skipped[event.name] += 1
             return
+        if event.name == "persons.zero":
+            self._taking.append(fault)
         self._watch.begins(Happening(event, fault, event.name not in _WORK))
 
     def _blame(self) -> str:

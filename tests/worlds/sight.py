@@ -33,7 +33,7 @@ class Sight(NamedTuple):
 
     before : last valid setpoint before it. recent : what is present or ended less than `AFTER_S` ago, oldest first.
     suspects : gauges that had a fault since a person last looked; "" where it could be any.
-    left_unseen : whether the machine has left its place, and no reading shows it yet.
+    left_unseen : whether no reading shows yet what is wrong: the machine has left its place, or a fault hides.
     """
 
     configuration: Configuration

@@ -3,17 +3,22 @@
 from __future__ import annotations
 
 import hashlib
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from compd.live.loop import Setpoint
 from compd.setpoint_states import State
 from tests.worlds import invariants
+from tests.worlds.blindness import Blindness, Onset, left_out
 from tests.worlds.coverage import Coverage
 from tests.worlds.departure import Departure
 from tests.worlds.recovery import Recovery
 from tests.worlds.sight import Happening, Sight
 from tests.worlds.world import Told, World
+
+# Between two comparisons of the gauges with each other, s.
+LOOK_EVERY_S = 0.1
 
 
 @dataclass
@@ -41,6 +46,7 @@ class Watch:
     """
 
     world: World
+    blindness: Blindness
     digest: hashlib._Hash = field(default_factory=hashlib.sha256)
     coverage: Coverage = field(default_factory=Coverage)
     found: dict[tuple[str, str], Finding] = field(default_factory=dict)
@@ -52,10 +58,12 @@ class Watch:
         self._recovery = Recovery()
         self._recent: list[Happening] = []
         self._suspects: set[str] = set()
+        self._onsets: list[tuple[Happening, Onset]] = []
         self._before: Setpoint | None = None
         self._departure = Departure(self.world)
         self._faulty_since_s: float | None = None
         self.world.hearers.append(self.hear)
+        self.world.hub.every(LOOK_EVERY_S, lambda: self.blindness.look(self.world.hub.now_s))
 
     def begins(self, happening: Happening) -> None:
         """An event begins. Its gauges are suspects until a person has looked; all gauges where it names none."""
@@ -63,11 +71,15 @@ class Watch:
         self._recovery.begins(happening)
         if happening.is_fault:
             self._suspects.update(happening.fault.targets or ("",))
+        if happening.is_fault and happening.fault.targets:
+            onset = self.blindness.begins(happening.fault.began_s, *happening.fault.targets)
+            self._onsets.append((happening, onset))
 
     def accepted(self) -> None:
         """A person has looked at every gauge."""
         now_s = self.world.hub.now_s
         self._recovery.accepted(now_s)
+        self.blindness.accept()
         self._faulty_since_s = None
         self._suspects = set()
         for happening in self._recent:
@@ -92,7 +104,7 @@ class Watch:
             self._before,
             tuple(self._recent),
             frozenset(self._suspects),
-            self._departure.unseen(setpoint, told),
+            self._departure.unseen(setpoint, told) or self._hides_at(setpoint.time_s),
         )
         self.coverage.count(sight.cases, told.valid, told.error_um, sight.bound_um)
         for name, invariant in invariants.OF_SETPOINTS.items():
@@ -108,6 +120,14 @@ class Watch:
             self._before = setpoint
         if self.hear_also is not None:
             self.hear_also(sight)
+
+    def _hides_at(self, time_s: float) -> bool:
+        """Whether a fault that no reading shows yet has an effect at this time, s."""
+        for happening, onset in self._onsets:
+            if not happening.fault.present and onset.ended_s == math.inf:
+                self.blindness.ends(onset, happening.fault.ended_s)
+        self._onsets = [one for one in self._onsets if time_s < min(one[1].seen_s, one[1].ended_s)]
+        return left_out([onset for _, onset in self._onsets], time_s)
 
     def note(self, what: str, blame: str, text: str) -> None:
         """Something does not hold now."""

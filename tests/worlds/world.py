@@ -98,7 +98,7 @@ class World:
         self.daemon: Daemon | None = None
         self.controller = Controller(self.system, configuration, lambda scale_mm: self.drive(scale_mm.tolist()))
         self._on = False
-        self._closing: list[Daemon] = []
+        self._to_close: list[Daemon] = []
         self._live = LiveWorld(truth, self.system)
         self._plug_in_devices()
         hub.every(STEP_S, self._live.step)
@@ -133,14 +133,17 @@ class World:
 
     def _run_daemon(self) -> None:
         failed = run_daemon(load(self.configuration.path), self.system)
-        self._closing.clear()
         if failed and self._on:
             self.hub.at(self.hub.now_s + RESTART_S, self.start)
 
-    def observe(self, daemon: Daemon) -> None:
+    def begun(self, daemon: Daemon) -> None:
         """A daemon has been made: this one, or the one of another configuration."""
         self.daemon = daemon
-        self._closing.append(daemon)
+        self._to_close.append(daemon)
+
+    def closed(self, daemon: Daemon) -> None:
+        """A daemon has closed its descriptors."""
+        self._to_close.remove(daemon)
 
     def kill(self, process: str) -> None:
         """SIGKILL for a process of the daemon; the others end with the supervisor, which is started anew."""
@@ -202,8 +205,7 @@ class World:
         names = self._running()
         for name in sorted(names, key=lambda name: name == SUPERVISOR):
             self.system.processes[name].kill()
-        daemons, self._closing = self._closing, []
-        for daemon in daemons:
+        for daemon in list(self._to_close):
             daemon.close()
 
     @property
@@ -368,7 +370,11 @@ def _observed(world: World) -> Iterator[None]:
     class ObservedDaemon(Daemon):
         def __init__(self, *arguments: Any, **named: Any) -> None:
             super().__init__(*arguments, **named)
-            world.observe(self)
+            world.begun(self)
+
+        def close(self, after: Daemon | None = None) -> None:
+            super().close(after)
+            world.closed(self)
 
     class ObservedLoop(Loop):
         def __init__(self, cycle: Any, latest: Any, commands: Any, sinks: Any, *arguments: Any) -> None:

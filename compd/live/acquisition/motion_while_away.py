@@ -38,7 +38,7 @@ def moved_while_away(memory: TrustMemory, i: int, back_s: float, now_s: float) -
     witness = memory.witness[i]
     tolerance = memory.tolerance_mm[:n]
     known = (np.arange(n) != i) & ~np.isnan(witness)
-    good = known & (memory.doubt[:n] == Doubt.NONE)
+    good = known & memory.undoubted[:n]
     stayed = good & (memory.time_s[:n] > memory.lost_s[i])
     back = known & (memory.shown_s[:n] > memory.lost_s[i])
     waited = now_s - back_s >= WAIT_FOR_OTHERS_S
@@ -66,7 +66,7 @@ def stood_still(memory: TrustMemory, i: int, since_s: float) -> bool | None:
     None if one of them has not been read since `since_s` (s). False if there is none.
     """
     n, before = memory.lengths, memory.witness[i]
-    others = (np.arange(n) < memory.scales) & (np.arange(n) != i) & (memory.doubt[:n] == Doubt.NONE) & ~np.isnan(before)
+    others = (np.arange(n) < memory.scales) & (np.arange(n) != i) & memory.undoubted[:n] & ~np.isnan(before)
     if (memory.shown_s[:n] < since_s)[others].any():
         return None
     return bool(others.any() and (np.abs(memory.shown[:n] - before) <= memory.tolerance_mm[:n])[others].all())
@@ -76,7 +76,7 @@ def scales_stood(memory: TrustMemory, i: int) -> bool:
     """Whether every believed scale has kept its value since `i` was last believed; False without a believed scale."""
     compared = 0
     for scale in range(memory.scales):
-        if memory.doubt[scale] != Doubt.NONE or math.isnan(before := memory.witness[i, scale]):
+        if memory.doubt_of(scale) is not Doubt.NONE or math.isnan(before := memory.witness[i, scale]):
             continue
         if abs(memory.value[scale] - before) > memory.tolerance_mm[scale]:
             return False

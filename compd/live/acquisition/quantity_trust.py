@@ -36,6 +36,7 @@ _MIN_NEIGHBOURS = 2
 _BACK_SHARE = 0.25
 
 
+_LOST = float(Doubt.LOST)
 # Doubts of which a quantity's own readings tell when they are over.
 _MAY_COME_BACK = (Doubt.JUMPED, Doubt.IMPLAUSIBLE, Doubt.APART)
 
@@ -72,8 +73,9 @@ class QuantityTrust:
         self._i = i = memory.index[channel]
         self._limits = limits
         self._unit = memory.unit(i)
-        same = [j for j in range(memory.lengths, len(memory.channels)) if j != i and memory.unit(j) == self._unit]
-        self._neighbours = np.array(same, dtype=np.int64)
+        self._neighbours = [
+            j for j in range(memory.lengths, len(memory.channels)) if j != i and memory.unit(j) == self._unit
+        ]
         self._expected = math.nan  # follows the readings at the fastest change at most
         self._expected_s = math.nan
         self._implausible_s = 0.0
@@ -87,7 +89,7 @@ class QuantityTrust:
         memory, i = self._memory, self._i
         if memory.accepted[i] != memory.obeyed[i]:
             return True
-        if Doubt(int(memory.doubt[i])).until_accepted:
+        if memory.doubt_of(i).until_accepted:
             return False
         return not self._recall() or self._fault(sample.value, sample.time_s) is not None
 
@@ -110,7 +112,7 @@ class QuantityTrust:
             memory.handled[i] = memory.voted[i]
             memory.distrust(i, Doubt.VOTED, math.nan)
         share_s = self._share_s(reading.time_s)
-        if Doubt(int(memory.doubt[i])).until_accepted and not self._is_back(reading, share_s):
+        if memory.doubt_of(i).until_accepted and not self._is_back(reading, share_s):
             return bad(reading.time_s, Quality.DISTRUSTED, memory.explanation(i))
         known = self._recall()
         candidates = (reading,) if first is None else (reading, first)
@@ -131,10 +133,10 @@ class QuantityTrust:
     def _is_back(self, reading: Reading, share_s: float) -> bool:
         """Whether a quantity that is not believed shows again, and for long enough, what it showed before."""
         memory, i = self._memory, self._i
-        if memory.doubt[i] not in _MAY_COME_BACK or math.isnan(memory.value[i]):
+        if memory.doubt_of(i) not in _MAY_COME_BACK or math.isnan(memory.value[i]):
             return False
         amount, away = float(memory.amount[i]), reading.value - float(memory.value[i])
-        was_away = amount - float(memory.value[i]) if memory.doubt[i] == Doubt.IMPLAUSIBLE else amount
+        was_away = amount - float(memory.value[i]) if memory.doubt_of(i) is Doubt.IMPLAUSIBLE else amount
         drift = self._limits.usual_per_s * (reading.time_s - float(memory.time_s[i]))
         near = abs(away) <= min(self._limits.tolerance + drift, _BACK_SHARE * abs(was_away))
         self._expected = math.nan
@@ -151,7 +153,7 @@ class QuantityTrust:
     def _recall(self) -> bool:
         """Whether a reading is known that the next one follows; that of another process counts, too."""
         memory, i = self._memory, self._i
-        if memory.doubt[i] == Doubt.LOST:  # since a daemon has ended; the time since then is unknown
+        if memory.doubt_of(i) is Doubt.LOST:  # since a daemon has ended; the time since then is unknown
             memory.value[i], memory.doubt[i] = math.nan, Doubt.NONE
             self._expected = math.nan
         elif math.isnan(self._expected) and not math.isnan(memory.value[i]):
@@ -260,11 +262,14 @@ class QuantityTrust:
 
         A neighbour that is not believed has no voice.
         """
-        memory, places = self._memory, self._neighbours
-        speak = (memory.doubt[places] <= Doubt.LOST) & (time_s - memory.shown_s[places] < _OLD_S)
-        others = memory.shown[places][speak]
-        far = np.abs(others - value) > self._limits.apart
-        if 2 * far.sum() <= len(others) or far.sum() < _MIN_NEIGHBOURS:
+        memory = self._memory
+        others = [
+            memory.shown[j]
+            for j in self._neighbours
+            if memory.doubt[j] <= _LOST and time_s - memory.shown_s[j] < _OLD_S
+        ]
+        far = sum(abs(other - value) > self._limits.apart for other in others)
+        if 2 * far <= len(others) or far < _MIN_NEIGHBOURS:
             return None
         away = value - float(np.median(others))
         return _Fault(

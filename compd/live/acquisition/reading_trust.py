@@ -96,7 +96,7 @@ class ReadingTrust:
         memory, i = self._memory, self._i
         if memory.accepted[i] != memory.obeyed[i]:
             return True
-        doubt = Doubt(int(memory.doubt[i]))
+        doubt = memory.doubt_of(i)
         if doubt.until_accepted:
             return False
         return (
@@ -152,7 +152,7 @@ class ReadingTrust:
             memory.handled[i] = memory.voted[i]
             memory.distrust(i, Doubt.VOTED, math.nan)
         self._lose_if_away(self._after[0].time_s if self._after else sample.time_s)
-        doubt = Doubt(int(memory.doubt[i]))
+        doubt = memory.doubt_of(i)
         if doubt.until_accepted:
             return self._reject(reading)
         if doubt is Doubt.LOST:
@@ -224,7 +224,7 @@ class ReadingTrust:
             memory.stepped[i] += 1  # last: it marks the others as complete
 
     def _reject(self, reading: Reading) -> Reading:
-        limits = self._limits_text() if self._memory.doubt[self._i] == Doubt.JUMPED else ""
+        limits = self._limits_text() if self._memory.doubt_of(self._i) is Doubt.JUMPED else ""
         return bad(reading.time_s, Quality.DISTRUSTED, self._memory.explanation(self._i) + limits)
 
     def _judge_after_absence(self, reading: Reading, sample: GaugeSample, first: Reading | None) -> Reading:

@@ -49,7 +49,7 @@ def way_by_links(
 
     None if they do not say: they have not been read for long enough since, or have not moved before nor after.
     """
-    links = [j for j in range(memory.scales) if j != i and memory.doubt[j] == Doubt.NONE]
+    links = [j for j in range(memory.scales) if j != i and memory.doubt_of(j) is Doubt.NONE]
     paths = [_Path(readings) for readings in map(memory.recent, links) if len(readings) > 1]
     start, end = _side_start(before), _side_end(after)
     if not paths or end is None or not all(path.start_s <= start.time_s and end.time_s <= path.end_s for path in paths):

@@ -14,7 +14,7 @@ from pydantic import BaseModel, ConfigDict, FiniteFloat, ValidationError
 
 from compd.errors import Problem, StateError
 from compd.files import CHECKSUM, FileKind, checksum_of
-from compd.live.system import THIS_COMPUTER, System
+from compd.live.system import System
 
 FILE_NAME = "machine-zero.json"
 # The machine zero before the present one, as its file was.
@@ -86,7 +86,7 @@ class MachineZero:
             if channel in before.readings_mm
         }
 
-    def save(self, directory: Path, system: System = THIS_COMPUTER) -> Path:
+    def save(self, directory: Path, system: System) -> Path:
         """Write the file in this directory, and return its path. After a power cut it is the old one or the new one.
 
         The file that was there stays beside it as OLD_FILE_NAME. Raises StateError when the disk refuses.
@@ -95,7 +95,6 @@ class MachineZero:
         content = {"format": _FORMAT, **self._kept, CHECKSUM: checksum_of(self._kept)}
         text = json.dumps(content, indent=1, allow_nan=False) + "\n"
         try:
-            directory.mkdir(parents=True, exist_ok=True)
             system.write_files({**_old_file(directory, system), path: text})
         except OSError as error:
             raise StateError.of(
@@ -118,7 +117,7 @@ def _old_file(directory: Path, system: System) -> dict[Path, bytes]:
 
 
 def zero_at_start(
-    directory: Path, zero_hash: str, channels: tuple[str, ...], has_gauges: bool, system: System = THIS_COMPUTER
+    directory: Path, zero_hash: str, channels: tuple[str, ...], has_gauges: bool, system: System
 ) -> MachineZero | StateError:
     """The machine zero on disk, or why there is none: the daemon runs without one, so that it can be taken.
 
@@ -139,9 +138,7 @@ def zero_at_start(
     return zero
 
 
-def load_zero(
-    directory: Path, zero_hash: str, channels: tuple[str, ...], system: System = THIS_COMPUTER
-) -> MachineZero:
+def load_zero(directory: Path, zero_hash: str, channels: tuple[str, ...], system: System) -> MachineZero:
     """The machine zero in the file in this directory.
 
     Parameters

@@ -12,7 +12,7 @@ from compd.live.loop import Setpoint
 from compd.live.memory import Control, Phase
 from compd.live.processes.log_relay import LogRelay
 from compd.live.service import LastReadings, ModelSwitch, Publisher, Requests, UdpSender, ZeroCapture
-from compd.live.system import Journal, System
+from compd.live.system import System
 from compd.setpoint_states import State
 
 # Characters. A reason that names every gauge of a machine has thousands; the log has it whole.
@@ -61,7 +61,7 @@ class ServiceProcess:
 
     def run(self) -> None:
         """Serve until the daemon stops."""
-        journal = Journal.from_environment()
+        journal = self.system.journal()
         relay = LogRelay(self.logs, _write if journal is None else journal.write, self.system)
         relay.start()
         self.last_readings.start()

@@ -63,7 +63,7 @@ class Acceptance:
     def _is_believed(self, channel: str) -> bool:
         trust, i = self._trust, self._trust.index[channel]
         obeyed = trust.accepted[i] == trust.obeyed[i]
-        return bool(obeyed and trust.doubt[i] == Doubt.NONE and not trust.suspected[i])
+        return bool(obeyed and trust.doubt_of(i) is Doubt.NONE and not trust.suspected[i])
 
     def _reason(self, channel: str) -> str:
         trust, i = self._trust, self._trust.index[channel]

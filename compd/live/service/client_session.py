@@ -15,7 +15,6 @@ from typing import Any, NamedTuple
 
 from compd.live.service.descriptor_bin import DescriptorBin
 from compd.live.service.messages import MAX_LINE_BYTES, ErrorCode, ProtocolError
-from compd.live.system import THIS_COMPUTER
 
 # About 150 setpoints: 0.7 s at 200 Hz. A client that is further behind acts on old setpoints.
 MAX_BEHIND_BYTES = 128 * 1024
@@ -90,8 +89,8 @@ class ClientSession:
         connection: socket.socket,
         name: str,
         local: bool,
+        unwanted: DescriptorBin,
         now_s: float = 0.0,
-        unwanted: DescriptorBin | None = None,
         place_of: Callable[[bytes], Place] = _own_place,
     ) -> None:
         """`name`: of the other end; `local`: connected over the Unix socket, from this computer; `unwanted`: closes
@@ -113,7 +112,7 @@ class ClientSession:
         self._max_behind_bytes = MAX_BEHIND_BYTES
         self._received = bytearray()
         self._lines: deque[_ReceivedLine] = deque()
-        self._unwanted = unwanted or DescriptorBin(THIS_COMPUTER)
+        self._unwanted = unwanted
         self._descriptor: int | None = None  # of the line that is still coming
         self._answered_descriptor: int | None = None  # of the line that `next_line` has given
         self._skipping_line = False

@@ -50,7 +50,7 @@ class DescriptorBin:
                 self._filled.clear()
                 if self._waiting.empty():  # nothing was put in between
                     self._system.wait(self._filled, _HANGS_AFTER_S)
-            descriptor = self._waiting.get()
+            descriptor = self._waiting.get_nowait()
             self._begun_s = self._system.monotonic()
             with suppress(OSError):  # what the file system says at the end is nobody's concern here
                 close_descriptor(descriptor)

@@ -179,7 +179,6 @@ class LastReadings:
         }
         content[CHECKSUM] = checksum_of(content)
         try:
-            self._path.parent.mkdir(parents=True, exist_ok=True)
             self._system.write_files({self._path: json.dumps(content, indent=1, allow_nan=False) + "\n"})
         except OSError as error:
             if not self._failed:

@@ -104,7 +104,7 @@ class ModelSwitch:
     def look(self) -> None:
         """Pass on what has been read, and send the answer, if it has come."""
         while not self._read.empty():
-            self._take(self._read.get())
+            self._take(self._read.get_nowait())
         if self._answer is not None and self._system.monotonic() >= self._read_until_s:
             self._end(f"{self._wish.file} could not be read within {READ_WITHIN_S:g} s: its file system hangs")
         if self._answer is None or (message := self._control.model_answer.read()) is None:

@@ -138,7 +138,7 @@ class Publisher:
             prepare_tcp(connection)
         name = "unix" if local else f"{address[0]}:{address[1]}"
         session = ClientSession(
-            connection, name, local, self._system.monotonic(), self._unwanted, self._requests.place_of
+            connection, name, local, self._unwanted, self._system.monotonic(), self._requests.place_of
         )
         tcp_clients = sum(not other.local for other in self._sessions)
         if (refusal := seat_refused(local, len(self._sessions), tcp_clients)) is not None:

@@ -13,7 +13,7 @@ from typing import Any, Literal
 
 import structlog
 
-from compd.clock import Clock, MonotonicClock
+from compd.clock import Clock
 from compd.errors import DaemonError
 from compd.files import read_small_file
 from compd.live.loop import Commands, Target
@@ -168,9 +168,9 @@ class RequestContext:
         errands: Errands,
         commands: Commands,
         target_keys: TargetKeys,
+        clock: Clock,
         targets: TargetSettings | None = None,
         access: TcpAccess | None = None,
-        clock: Clock | None = None,
     ) -> None:
         """`targets`: how long a target may be used, and who may give one; `access`: who may use TCP, None for everybody
         who reaches it."""
@@ -183,7 +183,7 @@ class RequestContext:
         self.controller: ClientSession | None = None  #: the client that gives targets; None for none
         self._targets = targets or TargetSettings()
         self.access = access
-        self.clock = clock or MonotonicClock()
+        self.clock = clock
 
     def authorize(self, client: ClientSession, token: str) -> None:
         """Let a client in that shows the token. Raises ProtocolError (not_authorized) for another one."""

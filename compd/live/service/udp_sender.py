@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import socket
 from typing import Any
 
 from compd.errors import DaemonError
 from compd.live.loop import Setpoint
+from compd.live.system import System
 from compd.operation_settings import UdpTarget
 
 
@@ -16,10 +16,10 @@ class UdpSender:
     A packet that the system does not take at once is dropped and counted.
     """
 
-    def __init__(self, target: UdpTarget) -> None:
+    def __init__(self, target: UdpTarget, system: System) -> None:
         """Raises DaemonError for an unknown host."""
         try:
-            family, kind, protocol, _, address = socket.getaddrinfo(target.host, target.port, type=socket.SOCK_DGRAM)[0]
+            self._datagrams = system.datagrams(target.host, target.port)
         except OSError as error:
             raise DaemonError.of(
                 "sockets.udp.host",
@@ -27,16 +27,13 @@ class UdpSender:
                 value=target.host,
                 next_step="write the controller's IP address",
             ) from error
-        self._address: Any = address
-        self._socket = socket.socket(family, kind, protocol)
-        self._socket.setblocking(False)
         self.sent = 0
         self.dropped = 0
 
     def deliver(self, setpoint: Setpoint) -> None:
         """Send the packet of a setpoint, without waiting."""
         try:
-            self._socket.sendto(setpoint.packet, self._address)
+            self._datagrams.send(setpoint.packet)
         except OSError:
             self.dropped += 1
         else:
@@ -48,4 +45,4 @@ class UdpSender:
 
     def close(self) -> None:
         """Close the socket."""
-        self._socket.close()
+        self._datagrams.close()

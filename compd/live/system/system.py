@@ -19,9 +19,12 @@ from uuid import UUID
 from compd.clock import MonotonicClock
 from compd.files import Content, read_small_file, write_files
 from compd.lines import PORTS, Ports
+from compd.live.system.datagrams import Datagrams
 from compd.live.system.forked_process import ForkedProcess
+from compd.live.system.journal import Journal
 from compd.live.system.privileges import Privileges
 from compd.live.system.realtime import sleep_until
+from compd.live.system.systemd import Notifier
 
 _BOOT_ID = Path("/proc/sys/kernel/random/boot_id")
 # Set by the unit: %b of systemd.unit(5).
@@ -63,12 +66,26 @@ class System(MonotonicClock):
         """Start a process; see `ForkedProcess`."""
         return ForkedProcess(run, name, output, keeps_sockets)
 
+    def datagrams(self, host: str, port: int) -> Datagrams:
+        """Packets to an address. Raises OSError for an unknown host."""
+        return Datagrams(host, port)
+
+    def journal(self) -> Journal | None:
+        """The journal of systemd; None where standard error does not lead to it."""
+        return Journal.from_environment()
+
+    def notifier(self) -> Notifier:
+        """What tells systemd of the daemon's state."""
+        return Notifier.from_environment()
+
     def read_file(self, path: Path, limit_bytes: int) -> bytes:
         """A file as a whole. Raises OSError, also for one that is longer."""
         return read_small_file(path, limit_bytes)
 
     def write_files(self, contents: Mapping[Path, Content]) -> None:
-        """Write all of these files or none, see `compd.files.write_files`. Raises OSError."""
+        """Make the directories of these files, and write all or none; see `compd.files.write_files`. Raises OSError."""
+        for path in contents:
+            path.parent.mkdir(parents=True, exist_ok=True)
         write_files(contents)
 
     @contextmanager

@@ -124,22 +124,20 @@ class Equilibrium:
             self._weather.humidity_pct(warm.time_s),
             self._weather.at_zero,
         )
-        beyond_mm = _sum((cause.scale_extension_mm(inputs) for cause in causes), machine.scales)
+        beyond_mm = np.zeros(machine.scales) + _sum(cause.scale_extension_mm(inputs) for cause in causes)
         link_mm = (
             lengths_mm
             + balls.base_along_mm
             - balls.platform_along_mm
-            + _sum((cause.link_extension_mm(inputs) for cause in causes), machine.links)
+            + _sum(cause.link_extension_mm(inputs) for cause in causes)
             + machine.extensions(beyond_mm)
         )
         closure = machine.turned_with_base(self._closure, supports_M)
         posture = closure.by_lengths(
             machine.base_joints_M(supports_M, stretch, scale_mm + beyond_mm)
             + balls.base_across_M
-            + _sum((cause.base_shift_M(inputs) for cause in causes), machine.links, 3),
-            joints_P
-            + balls.platform_across_P
-            + _sum((cause.platform_shift_P(inputs) for cause in causes), machine.links, 3),
+            + _sum(cause.base_shift_M(inputs) for cause in causes),
+            joints_P + balls.platform_across_P + _sum(cause.platform_shift_P(inputs) for cause in causes),
             link_mm,
             posture,
         )
@@ -150,10 +148,8 @@ class Equilibrium:
                 value=np.array2string(scale_mm, precision=3),
                 next_step="ask for a place nearer to machine zero",
             )
-        tip_M, tip_P = self._tip(posture, _sum((cause.tool_shift(inputs) for cause in causes), 3))
-        shown = (tip_M if machine.tip_frame == "M" else tip_P) + _sum(
-            (cause.reference_shift(inputs) for cause in causes), 3
-        )
+        tip_M, tip_P = self._tip(posture, _sum(cause.tool_shift(inputs) for cause in causes))
+        shown = (tip_M if machine.tip_frame == "M" else tip_P) + _sum(cause.reference_shift(inputs) for cause in causes)
         return EquilibriumState(scale_mm, posture, supports_M, plate_M, balls, link_mm, axial_N, tip_M, tip_P, shown)
 
     def _warmed_parts(self) -> _Warmed:
@@ -199,8 +195,8 @@ class Equilibrium:
         return closure.forces(posture, base_M, joints_P, loads)
 
 
-def _sum(displacements: Iterable[FloatArray | float], *shape: int) -> FloatArray:
-    total = np.zeros(shape)
+def _sum(displacements: Iterable[FloatArray | float]) -> FloatArray | float:
+    total: FloatArray | float = 0.0
     for displacement in displacements:
         if isinstance(displacement, np.ndarray) or displacement != 0:
             total = total + displacement

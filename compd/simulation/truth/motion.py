@@ -95,17 +95,25 @@ class Approach:
         self._even_s = self._faster_s + even_mm / drives.mm_per_s
         self._ends_s = self._even_s + peak / acceleration
         self.duration_s = float(self._ends_s.max())
+        # of each link: a position is asked for so often that calls of NumPy would take most of the time
+        self._profile = np.transpose(
+            [
+                start_mm,
+                start_mm_per_s,
+                end_mm,
+                0.5 * acceleration * self._sign,
+                self._sign * peak,
+                self._faster_s,
+                self._even_s,
+                self._ends_s,
+            ]
+        ).tolist()
 
     def position_mm(self, time_s: float) -> FloatArray:
         """(n,) scale positions `time_s` after the start; `end_mm` after the end."""
         if time_s >= self.duration_s:
             return self.end_mm
-        half = 0.5 * self._drives.mm_per_s2 * self._sign
-        faster_s, left_s = np.minimum(time_s, self._faster_s), np.maximum(self._ends_s - time_s, 0.0)
-        before_mm = self._start_mm + self._start_mm_per_s * faster_s + half * faster_s**2
-        before_mm = before_mm + self._sign * self._peak_mm_per_s * np.maximum(time_s - self._faster_s, 0.0)
-        position_mm: FloatArray = np.where(time_s < self._even_s, before_mm, self.end_mm - half * left_s**2)
-        return position_mm
+        return np.array([_position_mm(time_s, *link) for link in self._profile])
 
     def speeds_mm_per_s(self, time_s: float) -> FloatArray:
         """(n,) speeds `time_s` after the start."""
@@ -114,6 +122,26 @@ class Approach:
         before = self._start_mm_per_s + acceleration * faster_s
         speeds: FloatArray = np.where(time_s < self._even_s, before, acceleration * left_s)
         return speeds
+
+
+def _position_mm(
+    time_s: float,
+    start_mm: float,
+    start_mm_per_s: float,
+    end_mm: float,
+    half_mm_per_s2: float,
+    even_mm_per_s: float,
+    faster_s: float,
+    even_s: float,
+    end_s: float,
+) -> float:
+    """Position of one link: speeding up until `faster_s`, evenly until `even_s`, braking until `end_s`, s."""
+    if time_s >= even_s:
+        left_s = max(end_s - time_s, 0.0)
+        return end_mm - half_mm_per_s2 * (left_s * left_s)
+    speeding_s = min(time_s, faster_s)
+    speeding_mm = half_mm_per_s2 * (speeding_s * speeding_s)
+    return start_mm + start_mm_per_s * speeding_s + speeding_mm + even_mm_per_s * max(time_s - faster_s, 0.0)
 
 
 def stopping_place_mm(start_mm: FloatArray, start_mm_per_s: FloatArray, drives: Drives = DRIVES) -> FloatArray:

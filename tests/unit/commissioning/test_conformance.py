@@ -10,7 +10,7 @@ from typing import Any
 from unittest.mock import Mock
 
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from compd.conformance import DriverUnderTest, driver_under_test, faults, run_conformance
@@ -133,7 +133,7 @@ def run_through(driver: DriverUnderTest, polls: Sequence[Sequence[Fault]]) -> No
 
 
 @pytest.mark.parametrize("name", sampled(NAMES, 16))
-@settings(max_examples=60, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=60)
 @given(data=st.data())
 def test_no_interleaving_of_faults_gives_a_wrong_number(name: str, data: st.DataObject) -> None:
     driver = driver_under_test(name)

@@ -14,7 +14,7 @@ from decimal import Decimal
 from typing import Any
 
 import pytest
-from hypothesis import HealthCheck, example, given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from compd.gauge import LineFault, Quality, Reading
@@ -23,7 +23,7 @@ from compd.lines.kinds.modbus_rtu.master import crc16
 from compd.plugins import GAUGES, load
 from tests.support.wire_rig import InstantClock, ScriptedPort
 
-bounded = settings(max_examples=200, suppress_health_check=[HealthCheck.too_slow])
+bounded = settings(max_examples=200)
 
 
 def driver(name: str, **options: Any) -> Callable[[], Any]:

@@ -181,7 +181,7 @@ READERS: dict[str, Reader] = {
     "cycles": Reader(f"x{CYCLES_SUFFIX}", lambda path: list(RecordedCycles(path).cycles())),
     "plan": Reader("plan.csv", _problems(lambda path, problems: read_plan_file(path, 3, {}, problems))),
     "ball plate": Reader("plate.csv", _problems(read_plate)),
-    "machine zero": Reader(ZERO_NAME, lambda path: load_zero(path.parent, "", ("scale_1.position",))),
+    "machine zero": Reader(ZERO_NAME, lambda path: load_zero(path.parent, "", ("scale_1.position",), THIS_COMPUTER)),
     "last readings": Reader(LAST_NAME, _last_readings),
     "export": Reader("export.txt", _export(None)),
     **{f"export as {shape}": Reader("export.txt", _export(shape)) for shape in instrument_formats()},
@@ -265,7 +265,7 @@ def test_no_command_prints_anything_of_another_file(name: str, content: str, tmp
     assert_quotes_nothing(result.output + printed.getvalue() + str(result.exception))
 
 
-@settings(max_examples=50, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=50, suppress_health_check=[HealthCheck.too_slow, HealthCheck.function_scoped_fixture])
 @given(
     name=st.sampled_from(sorted(READERS)),
     pieces=st.lists(

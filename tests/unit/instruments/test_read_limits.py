@@ -53,7 +53,7 @@ def test_just_as_much_as_is_allowed_is_read(tmp_path: Any) -> None:
     assert len(read_export(path, ReadOptions(limits=limits, unit="mm")).line) == 3
 
 
-def test_one_line_of_many_cells_is_refused_before_it_is_split(tmp_path: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_one_line_of_many_cells_is_refused_at_once(tmp_path: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     for name in ("find_delimiter", "split_cells"):
         monkeypatch.setattr(f"compd.instruments.delimited.{name}", Mock(side_effect=AssertionError("it is split")))
     path = tmp_path / "line.csv"

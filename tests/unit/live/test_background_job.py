@@ -8,11 +8,12 @@ import pytest
 
 from compd.live.service.messages import ErrorCode, ProtocolError
 from compd.live.service.zero_capture import BackgroundJob
+from compd.live.system import THIS_COMPUTER
 from tests.support.patience import PATIENCE_S
 
 
 def test_a_second_request_is_refused_while_the_first_is_worked_on():
-    job = BackgroundJob("test", "one thing at a time")
+    job = BackgroundJob("test", "one thing at a time", THIS_COMPUTER)
     finish = threading.Event()
     answers = []
 
@@ -30,7 +31,7 @@ def test_a_second_request_is_refused_while_the_first_is_worked_on():
 
 
 def test_whoever_has_the_answer_may_ask_for_the_next_at_once():
-    job = BackgroundJob("test", "busy")
+    job = BackgroundJob("test", "busy", THIS_COMPUTER)
     answers = []
     finished = threading.Event()
 

@@ -16,7 +16,7 @@ from compd.live import daemon as daemon_module
 from compd.live.machine.machine_zero import MachineZero, load_zero
 from compd.live.machine.model_loader import Models
 from compd.live.service.zero_capture import ZeroCapture
-from compd.live.system import System
+from compd.live.system import THIS_COMPUTER, System
 from compd.setpoint_states import State
 from tests.support.live_machine import PERIOD_S, Machine, machine
 from tests.support.live_models import file_with, warm
@@ -74,7 +74,7 @@ def test_nothing_is_corrected_where_machine_zero_was_taken(tmp_path, name, links
     grown = live.settle().values
     assert grown.contributions["link_expansion"] == pytest.approx(-1e-6 * PPM_PER_K * grown.link_length_mm, rel=1e-4)
     assert live.settings.model.zero.link_length_mm == pytest.approx(grown.link_length_mm, abs=0.1)
-    again = load_zero(tmp_path, live.configuration.zero_hash, live.wires.length_channels)
+    again = load_zero(tmp_path, live.configuration.zero_hash, live.wires.length_channels, THIS_COMPUTER)
     assert again == live.commands.zero, "the file has the quantities, too"
 
 

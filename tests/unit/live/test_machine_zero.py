@@ -19,7 +19,7 @@ from compd.live.machine.machine_zero import FILE_NAME, OLD_FILE_NAME, MachineZer
 from compd.live.machine.wiring import MachineWires
 from compd.live.memory.latest import Latest
 from compd.live.service.zero_capture import REST_TOLERANCE_MM, ZeroCapture
-from compd.live.system import System
+from compd.live.system import THIS_COMPUTER, System
 from tests.support.paths import ROOT
 from tests.support.patience import PATIENCE_S
 
@@ -28,9 +28,9 @@ ZERO = MachineZero("abc", "2026-01-01T00:00:00+00:00", {"a.1": 1.25, "b.1": -0.1
 
 
 def test_what_is_saved_is_what_is_loaded(tmp_path):
-    path = ZERO.save(tmp_path / "state")
+    path = ZERO.save(tmp_path / "state", THIS_COMPUTER)
     assert path == tmp_path / "state" / FILE_NAME
-    assert load_zero(tmp_path / "state", "abc", ("a.1", "b.1")) == ZERO
+    assert load_zero(tmp_path / "state", "abc", ("a.1", "b.1"), THIS_COMPUTER) == ZERO
     assert [p.name for p in path.parent.iterdir()] == [FILE_NAME], "no temporary file stays"
 
 
@@ -62,20 +62,20 @@ def test_a_zero_that_is_not_whole_or_not_this_machines_is_refused(tmp_path, cont
     if content is not None:
         (tmp_path / FILE_NAME).write_text(content)
     with pytest.raises(StateError, match=says):
-        load_zero(tmp_path, "abc", ("a.1", "b.1"))
+        load_zero(tmp_path, "abc", ("a.1", "b.1"), THIS_COMPUTER)
 
 
 def test_a_crash_while_writing_leaves_the_old_zero(tmp_path, monkeypatch):
-    ZERO.save(tmp_path)
+    ZERO.save(tmp_path, THIS_COMPUTER)
 
     def power_cut(descriptor):
         raise OSError(5, "Input/output error")
 
     monkeypatch.setattr(os, "fsync", power_cut)
     with pytest.raises(StateError, match="cannot be written: Input/output error"):
-        replace(ZERO, readings_mm={"a.1": 9.0, "b.1": 9.0}).save(tmp_path)
+        replace(ZERO, readings_mm={"a.1": 9.0, "b.1": 9.0}).save(tmp_path, THIS_COMPUTER)
     monkeypatch.undo()
-    assert load_zero(tmp_path, "abc", ("a.1", "b.1")) == ZERO
+    assert load_zero(tmp_path, "abc", ("a.1", "b.1"), THIS_COMPUTER) == ZERO
 
 
 def test_the_disk_has_the_content_before_the_name_and_then_the_name(tmp_path, monkeypatch):
@@ -92,7 +92,7 @@ def test_the_disk_has_the_content_before_the_name_and_then_the_name(tmp_path, mo
 
     monkeypatch.setattr(os, "fsync", fsync)
     monkeypatch.setattr(Path, "replace", replace_)
-    ZERO.save(tmp_path)
+    ZERO.save(tmp_path, THIS_COMPUTER)
     assert order == ["file", "rename", "directory"]
 
 
@@ -158,7 +158,10 @@ def test_zero_is_the_mean_of_every_gauge_saved_and_then_adopted(tmp_path):
     assert isinstance(taking.commands.zero, MachineZero)
     assert set(taking.commands.zero.readings_mm) == set(taking.wires.length_channels)
     assert taking.commands.zero.readings_mm["joints.4"] == pytest.approx(3.0, abs=1e-4)
-    assert load_zero(tmp_path, taking.commands.zero.zero_hash, taking.wires.length_channels) == taking.commands.zero
+    assert (
+        load_zero(tmp_path, taking.commands.zero.zero_hash, taking.wires.length_channels, THIS_COMPUTER)
+        == taking.commands.zero
+    )
 
 
 def test_a_reading_seen_twice_counts_once(tmp_path):
@@ -203,37 +206,37 @@ def test_a_disk_that_refuses_is_told_and_the_old_zero_stays(tmp_path):
 
 
 def test_a_digit_that_was_changed_by_hand_is_refused(tmp_path):
-    path = ZERO.save(tmp_path)
+    path = ZERO.save(tmp_path, THIS_COMPUTER)
     path.write_text(path.read_text().replace("1.25", "1.26"))
     with pytest.raises(StateError, match="changed after it was written"):
-        load_zero(tmp_path, "abc", ("a.1", "b.1"))
+        load_zero(tmp_path, "abc", ("a.1", "b.1"), THIS_COMPUTER)
     content = json.loads(path.read_text())
     del content["checksum"]
     path.write_text(json.dumps(content))
     with pytest.raises(StateError, match="no checksum"):
-        load_zero(tmp_path, "abc", ("a.1", "b.1"))
+        load_zero(tmp_path, "abc", ("a.1", "b.1"), THIS_COMPUTER)
 
 
 def test_a_file_of_an_earlier_release_has_no_checksum_and_is_used(tmp_path):
     (tmp_path / FILE_NAME).write_text(json.dumps({"format": 1, **ZERO.to_json()}))
-    assert load_zero(tmp_path, "abc", ("a.1", "b.1")) == ZERO
+    assert load_zero(tmp_path, "abc", ("a.1", "b.1"), THIS_COMPUTER) == ZERO
 
 
 def test_the_file_keeps_the_ports_and_a_recording_does_not(tmp_path):
     zero = replace(ZERO, ports={"a": "/dev/serial/by-id/usb-one", "b": "192.168.10.20:502:1"})
-    path = zero.save(tmp_path)
-    assert load_zero(tmp_path, "abc", ("a.1", "b.1")) == zero
+    path = zero.save(tmp_path, THIS_COMPUTER)
+    assert load_zero(tmp_path, "abc", ("a.1", "b.1"), THIS_COMPUTER) == zero
     assert "ports" not in zero.to_json()
     path.write_text(path.read_text().replace("usb-one", "usb-two"))
     with pytest.raises(StateError, match="changed after it was written"):
-        load_zero(tmp_path, "abc", ("a.1", "b.1"))
+        load_zero(tmp_path, "abc", ("a.1", "b.1"), THIS_COMPUTER)
 
 
 def test_a_file_without_ports_is_used(tmp_path):
     (tmp_path / FILE_NAME).write_text(
         json.dumps({"format": 2, **ZERO.to_json(), "checksum": checksum_of(ZERO.to_json())})
     )
-    assert load_zero(tmp_path, "abc", ("a.1", "b.1")) == ZERO
+    assert load_zero(tmp_path, "abc", ("a.1", "b.1"), THIS_COMPUTER) == ZERO
 
 
 @pytest.mark.parametrize(
@@ -250,22 +253,22 @@ def test_a_file_without_ports_is_used(tmp_path):
 def test_a_file_that_is_none_is_an_error_and_neither_hangs_nor_fills_the_memory(tmp_path, make, says):
     make(tmp_path / FILE_NAME)
     with pytest.raises(StateError, match=says):
-        load_zero(tmp_path, "abc", ("a.1", "b.1"))
+        load_zero(tmp_path, "abc", ("a.1", "b.1"), THIS_COMPUTER)
 
 
 def test_the_zero_before_is_kept_beside_the_new_one(tmp_path):
-    first = ZERO.save(tmp_path).read_bytes()
+    first = ZERO.save(tmp_path, THIS_COMPUTER).read_bytes()
     later = replace(ZERO, taken_at="2026-01-02T00:00:00+00:00")
-    second = later.save(tmp_path).read_bytes()
+    second = later.save(tmp_path, THIS_COMPUTER).read_bytes()
     assert (tmp_path / OLD_FILE_NAME).read_bytes() == first
-    ZERO.save(tmp_path)
+    ZERO.save(tmp_path, THIS_COMPUTER)
     assert (tmp_path / OLD_FILE_NAME).read_bytes() == second
-    assert load_zero(tmp_path, "abc", ("a.1", "b.1")) == ZERO
+    assert load_zero(tmp_path, "abc", ("a.1", "b.1"), THIS_COMPUTER) == ZERO
 
 
 def test_a_full_disk_leaves_both_files_as_they_were_and_no_other(tmp_path, monkeypatch):
-    ZERO.save(tmp_path)
-    replace(ZERO, taken_at="2026-01-02T00:00:00+00:00").save(tmp_path)
+    ZERO.save(tmp_path, THIS_COMPUTER)
+    replace(ZERO, taken_at="2026-01-02T00:00:00+00:00").save(tmp_path, THIS_COMPUTER)
     before = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
 
     def full(descriptor):
@@ -273,7 +276,7 @@ def test_a_full_disk_leaves_both_files_as_they_were_and_no_other(tmp_path, monke
 
     monkeypatch.setattr(os, "fsync", full)
     with pytest.raises(StateError, match="No space left"):
-        ZERO.save(tmp_path)
+        ZERO.save(tmp_path, THIS_COMPUTER)
     assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == before
 
 

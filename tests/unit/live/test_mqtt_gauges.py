@@ -22,6 +22,7 @@ from compd.source_time import SAME_TIME_S
 from tests.support.hand_clock import SteppedClock
 from tests.support.mosquitto import Broker, Publisher, needs_mosquitto, publisher, running_broker
 from tests.support.pushed_gauges import STALE_AFTER_S, acquiring, gauge
+from tests.support.watching import until
 
 pytestmark = needs_mosquitto
 OK = Quality.OK
@@ -84,6 +85,13 @@ def listening(
         for channel in latest.channels:
             latest.wait_for_any(channel)
         yield acquisition, latest
+
+
+def pass_time(clock: SteppedClock, step_s: float) -> None:
+    """Let `step_s` pass while the line's thread looks for messages: the next one has come afterwards."""
+    clock.step(step_s)
+    reads = clock.reads
+    until("the line has looked again and again", lambda: clock.reads > reads + 20)
 
 
 def gauge_status(acquisition: Any) -> dict[str, Any]:
@@ -227,7 +235,7 @@ def test_silence_becomes_a_timeout_while_the_connection_is_up(broker: Broker, de
     with listening(broker, device, timed(), clock=clock) as (acquisition, latest):
         device.publish("a", payload(1.5))
         latest.wait_for("g.a", OK)
-        clock.step(1.01 * STALE_AFTER_S)
+        pass_time(clock, 1.01 * STALE_AFTER_S)
         reading = latest.wait_for("g.a", Quality.TIMEOUT)
         assert f"nothing new on a for {STALE_AFTER_S:g} s" in reading.detail
         assert acquisition.status()["l"]["state"] == "open"
@@ -249,7 +257,7 @@ def test_two_topics_of_one_gauge_do_not_wait_for_each_other(broker: Broker, devi
         assert latest.wait_for("g.b", OK).value == 2.0
         since = latest.now
         while not any(n == "g.a" and r.quality is Quality.TIMEOUT for n, r in latest.history[since:]):
-            clock.step(STALE_AFTER_S / 4)
+            pass_time(clock, STALE_AFTER_S / 4)
             published = latest.now
             device.publish("b", payload(2.0))
             latest.wait_for_any("g.b", published)

@@ -294,7 +294,7 @@ def test_check_prints_what_there_is(tmp_path: Path) -> None:
 number = st.floats(-1000, 1000, allow_nan=False)
 
 
-@settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=60, suppress_health_check=[HealthCheck.too_slow, HealthCheck.function_scoped_fixture])
 @given(data=st.data())
 def test_what_is_written_is_read_back(tmp_path: Path, data: st.DataObject) -> None:
     rows = data.draw(st.integers(2, 12))

@@ -243,7 +243,7 @@ def test_file_of_another_kind(tmp_path: Path, content: bytes, wanted: str) -> No
 
 @pytest.mark.long
 @pytest.mark.sample
-@settings(max_examples=150, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=150, suppress_health_check=[HealthCheck.too_slow, HealthCheck.function_scoped_fixture])
 @given(data=st.data())
 def test_nothing_but_words_comes_of_any_file(tmp_path: Path, data: st.DataObject) -> None:
     """Whatever a file holds, it is read or refused as a RecordingError: no other exception."""

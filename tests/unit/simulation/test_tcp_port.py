@@ -5,11 +5,7 @@ from __future__ import annotations
 import socket
 
 from compd.simulation.wires.tcp_port import ANY, LOOPBACK, claimed_port
-
-
-def free_port() -> int:
-    with socket.create_server((LOOPBACK, 0)) as listener:
-        return int(listener.getsockname()[1])
+from tests.support.ports import free_port
 
 
 def test_the_configured_port_is_kept() -> None:

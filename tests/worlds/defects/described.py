@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -12,11 +12,15 @@ _HERE = Path(__file__).parent
 
 
 class Defect(NamedTuple):
-    """What a defect is, which invariant finds it, which kind of fault shows it, and the test of a scenario."""
+    """What a defect is, and which invariant finds it.
+
+    shows : which fault shows it. beside : kinds of such faults in rates.yaml. shown_by : the test of a scenario.
+    """
 
     what: str
     invariant: str
-    kind: str
+    shows: str
+    beside: Sequence[str]
     shown_by: str
 
 

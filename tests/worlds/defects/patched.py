@@ -15,6 +15,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from importlib import import_module
 from pathlib import Path
+from subprocess import PIPE
 from typing import NamedTuple
 
 from compd import jit
@@ -30,19 +31,15 @@ class Patched(NamedTuple):
     path: Path
     digest: str
 
-    def run(self, module: str, *arguments: str, timeout_s: float | None = None) -> subprocess.CompletedProcess[str]:
-        """Run a module of the tree as a program that imports this copy of compd."""
-        start = ["-m", "tests.worlds.defects.start", str(self.path), self.digest, module]
-        return run([*start, *arguments], timeout_s)
+    def start(self, module: str, *arguments: str) -> subprocess.Popen[str]:
+        """Start a module of the tree as a program that imports this copy of compd."""
+        return started(["-m", "tests.worlds.defects.start", str(self.path), self.digest, module, *arguments])
 
 
-def run(arguments: list[str], timeout_s: float | None = None) -> subprocess.CompletedProcess[str]:
-    """Run Python in the tree, and wait for its end."""
+def started(arguments: list[str]) -> subprocess.Popen[str]:
+    """Start Python in the tree; its errors come out here."""
     environment = {key: value for key, value in os.environ.items() if key != "PYTHONPATH"}
-    command = [sys.executable, *arguments]
-    return subprocess.run(
-        command, check=False, cwd=ROOT, env=environment, capture_output=True, text=True, timeout=timeout_s
-    )
+    return subprocess.Popen([sys.executable, *arguments], cwd=ROOT, env=environment, stdin=PIPE, stdout=PIPE, text=True)
 
 
 @contextmanager

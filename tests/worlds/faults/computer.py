@@ -5,7 +5,7 @@ from __future__ import annotations
 import random
 
 from tests.worlds.faults.fault import Fault
-from tests.worlds.faults.layers import disturb
+from tests.worlds.faults.layers import delay, disturb
 from tests.worlds.hub import usually_late
 from tests.worlds.wires import lost, whole
 from tests.worlds.world import ACQUISITION, LOOP, SERVICE, World
@@ -30,16 +30,11 @@ def pause_process(world: World, target: str, lasts_s: float) -> Fault:
 
 def wakes_late(world: World, target: str, share: float, by_s: float, lasts_s: float) -> Fault:
     """A `share` of the wake-ups of the process `target` is late by up to `by_s` (s), for `lasts_s` (s)."""
-    lateness = world.hub.lateness
-    before = lateness.get(target, usually_late)
 
     def late(rng: random.Random) -> float:
-        more_s = rng.uniform(0.0, by_s) if fault.present and rng.random() < share else 0.0
-        return before(rng) + more_s
+        return rng.uniform(0.0, by_s) if rng.random() < share else 0.0
 
-    fault = Fault(world, lasts_s=lasts_s)
-    lateness[target] = late
-    return fault
+    return Fault(world, delay(world.hub, target, late), lasts_s)
 
 
 def killed(world: World, target: str) -> Fault:

@@ -1,10 +1,12 @@
-"""Several faults of one wire or gauge at once: each is a layer, and leaves without the others."""
+"""Several faults of one wire, gauge or process at once: each is a layer, and leaves without the others."""
 
 from __future__ import annotations
 
+import random
 from collections.abc import Callable, Sequence
 from weakref import WeakKeyDictionary
 
+from tests.worlds.hub import Hub, Lateness, usually_late
 from tests.worlds.wires import Fault as Disturbance
 from tests.worlds.wires import Wire
 from tests.worlds.world import World
@@ -39,6 +41,16 @@ class _Distortions:
         return value
 
 
+class _Latenesses:
+    """Lateness of the wake-ups of a process, added up."""
+
+    def __init__(self, first: Lateness) -> None:
+        self.layers = [first]
+
+    def __call__(self, rng: random.Random) -> float:
+        return sum(layer(rng) for layer in self.layers)
+
+
 _OUTAGES: WeakKeyDictionary[Wire, int] = WeakKeyDictionary()
 
 
@@ -62,6 +74,16 @@ def distort(world: World, gauge: str, distortion: Distortion) -> Remove:
     layers = shown.layers
     layers.append(distortion)
     return lambda: layers.remove(distortion)
+
+
+def delay(hub: Hub, process: str, more: Lateness) -> Remove:
+    """Let a process wake later until the returned function is called. more : beside its usual lateness, s."""
+    lateness = hub.lateness.get(process, usually_late)
+    if not isinstance(lateness, _Latenesses):
+        lateness = hub.lateness[process] = _Latenesses(lateness)
+    layers = lateness.layers
+    layers.append(more)
+    return lambda: layers.remove(more)
 
 
 def unplug(wire: Wire) -> Remove:

@@ -53,6 +53,7 @@ class MqttPublisher(SimulatedPushedLine):
     def pull_out(self) -> None:
         self._client.disconnect()
         self._client.loop_stop()
+        self._client.reinitialise()  # closes the two sockets that wake its thread
 
     def send(self, values: Mapping[str, Any], utc_s: float, fault: str | None = None) -> None:
         for topic, payload in values.items():

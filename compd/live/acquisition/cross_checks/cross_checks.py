@@ -15,7 +15,7 @@ from compd.live.acquisition.cross_checks.following_error import FollowingError
 from compd.live.acquisition.cross_checks.machine_view import Contradiction, MachineView, Remark, Vote, WiredLength
 from compd.live.acquisition.cross_checks.signal_periods import SignalPeriods
 from compd.live.acquisition.cross_checks.standing_scale import StandingScale
-from compd.live.memory import Doubt, Latest, TrustMemory
+from compd.live.memory import Latest, TrustMemory
 from compd.operation_settings import FrameVote, VoteSettings
 from compd.stated_noise import SCATTER_RATIO
 from compd.units import UM_PER_MM
@@ -312,7 +312,7 @@ class Votes:
             reading = readings[self._latest.index[channel]]
             if reading.ok and now_s - reading.time_s <= stale_after_s:
                 quantities[name] = reading.value
-        believed = (memory.doubt[:n] == Doubt.NONE) & ~np.isnan(value)
+        believed = memory.undoubted[:n] & ~np.isnan(value)
         change = self._sign * (value - zero_mm)
         return MachineView(now_s, memory, self._wired, value, believed, change, quantities, self._setpoint())
 

@@ -10,6 +10,8 @@ import pytest
 
 from compd.live.loop.commands import Target
 from compd.live.service.client_session import ClientSession
+from compd.live.service.descriptor_bin import DescriptorBin
+from compd.live.system import THIS_COMPUTER
 from tests.support.live_machine import machine
 from tests.support.watching import until
 
@@ -28,7 +30,7 @@ RELEASE = b'{"class":"RELEASE"}\n'
 def session(service):
     """A session whose lines nobody answers, and the client's end of its socket."""
     ours, client = socket.socketpair(socket.AF_UNIX)
-    session = ClientSession(ours, "unix", local=True, place_of=service.requests.place_of)
+    session = ClientSession(ours, "unix", True, DescriptorBin(THIS_COMPUTER), place_of=service.requests.place_of)
     with closing(client), closing(session):
         yield session, client
 
