@@ -1,4 +1,4 @@
-"""Cases in virtual time: a process that ends takes its connections along, a device answers for another, a port hangs up."""
+"""Cases in virtual time: a process ends, another hangs, devices are exchanged, the computer is busy."""
 
 from __future__ import annotations
 
