@@ -1,13 +1,13 @@
 """What must hold in every world: each a function that says what does not hold, and "" where it holds.
 
 Of each setpoint: `within_bound`, `steady_correction`, `true_reason`. Of a world between two of its events:
-`nothing_lost`; of a whole world: `mostly_valid`. `tests.worlds.recovery` has the times after faults, and
-`tests.worlds.run` sees tracebacks.
+`nothing_lost`; of its models: `adopted_model`; of a whole world: `mostly_valid`. `tests.worlds.recovery` has the times
+after faults, and `tests.worlds.run` sees tracebacks.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Set
 
 import numpy as np
 
@@ -83,6 +83,16 @@ def nothing_lost(taken: Mapping[str, float], used: Mapping[str, float]) -> str:
         return ""
     channels = sorted(name for name in {*taken, *used} if taken.get(name) != used.get(name))
     return f"machine zero of {len(channels)} channels is not the one that was taken last: {', '.join(channels[:5])}"
+
+
+def adopted_model(allowed: Set[str], used: str) -> str:
+    """The model that was adopted is the one that runs, also after the loop or its service was killed.
+
+    allowed : hashes of what was promised last and of what was asked for since. used : hash that a setpoint names.
+    """
+    if used in allowed:
+        return ""
+    return f"runs with the model {used or 'none'}; promised was {' or '.join(sorted(one or 'none' for one in allowed))}"
 
 
 def mostly_valid(coverage: Coverage, without_faults: bool) -> str:

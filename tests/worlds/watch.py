@@ -13,6 +13,7 @@ from tests.worlds import invariants
 from tests.worlds.blindness import Blindness, Onset, left_out
 from tests.worlds.coverage import Coverage
 from tests.worlds.departure import Departure
+from tests.worlds.promises import Promises
 from tests.worlds.recovery import Recovery
 from tests.worlds.sight import Happening, Sight
 from tests.worlds.world import Told, World
@@ -61,6 +62,7 @@ class Watch:
         self._onsets: list[tuple[Happening, Onset]] = []
         self._before: Setpoint | None = None
         self._departure = Departure(self.world)
+        self.promises = Promises(self.world)
         self._faulty_since_s: float | None = None
         self.world.hearers.append(self.hear)
         self.world.hub.every(LOOK_EVERY_S, lambda: self.blindness.look(self.world.hub.now_s))
@@ -98,7 +100,7 @@ class Watch:
         now_s = self.world.hub.now_s
         self._recent = [happening for happening in self._recent if happening.concerns(now_s)]
         sight = Sight(
-            self.world.configuration,
+            self.world.running,
             setpoint,
             told,
             self._before,
@@ -112,6 +114,8 @@ class Watch:
                 self.note(name, sight.blame, text)
         if text := self._recovery.late(sight):
             self.note("valid_again", sight.blame, text)
+        if text := self.promises.broken(setpoint):
+            self.note("adopted_model", sight.blame, text)
         if told.state is not State.FAULT:
             self._faulty_since_s = None
         elif self._faulty_since_s is None:

@@ -26,13 +26,14 @@ import yaml
 
 from compd.configuration import Configuration, load
 from compd.documents import read_document
+from compd.errors import CompdError
 from compd.live.daemon import Daemon
 from compd.live.loop import Loop, Setpoint
 from compd.live.machine import MachineZero
 from compd.live.run_daemon import run_daemon
 from compd.plugins import SIMULATED_GAUGES
 from compd.plugins import load as load_plugin
-from compd.setpoint_states import Mode, State
+from compd.setpoint_states import State
 from compd.simulation import World as Truth
 from compd.simulation.truth.motion import DRIVES, Drives
 from compd.simulation.truth.strengths import Strengths
@@ -40,6 +41,7 @@ from compd.simulation.wires.server import STEP_S, LiveWorld, Sensing
 from tests.worlds.clients import Clients
 from tests.worlds.controller import Controller
 from tests.worlds.hub import Hub
+from tests.worlds.tips import tip_mm, true_tip_mm
 from tests.worlds.virtual_system import VirtualSystem
 from tests.worlds.wires import VirtualPorts, Wire
 
@@ -88,6 +90,7 @@ class World:
         self.shown: dict[str, Callable[[str, float], float]] = {}
         self.told: list[Told] = []
         self.hearers: list[Callable[[Setpoint, Told], None]] = []
+        self.beginners: list[Callable[[], object]] = []
         self.log: deque[Mapping[str, Any]] = deque(maxlen=_LOG_ENTRIES)
         self.directory = directory
         self.ports = VirtualPorts()
@@ -131,7 +134,11 @@ class World:
         self.system.start(self._run_daemon, SUPERVISOR)
 
     def _run_daemon(self) -> None:
-        failed = run_daemon(load(self.configuration.path), self.system)
+        try:
+            failed = run_daemon(load(self.configuration.path), self.system)
+        except CompdError as error:  # the command says so, and fails
+            self.log.append({"event": "compd run", "problem": str(error), "time_s": self.hub.now_s})
+            failed = True
         if failed and self._on:
             self.hub.at(self.hub.now_s + RESTART_S, self.start)
 
@@ -139,15 +146,20 @@ class World:
         """A daemon has been made: this one, or the one of another configuration."""
         self.daemon = daemon
         self._to_close.append(daemon)
+        for begin in self.beginners:
+            begin()
 
     def closed(self, daemon: Daemon) -> None:
         """A daemon has closed its descriptors."""
         self._to_close.remove(daemon)
+        _hang_up(daemon)
 
     def kill(self, process: str) -> None:
         """SIGKILL for a process of the daemon."""
         for name in self._named(process):
             self.system.processes[name].kill()
+            if name == SERVICE and self.daemon is not None:
+                _hang_up(self.daemon)
 
     def kill_acquisition(self) -> None:
         """End the process that polls the gauges."""
@@ -206,6 +218,11 @@ class World:
         return [*self.system.tracebacks, *(entry["exception"] for entry in self.log if entry.get("exception"))]
 
     @property
+    def running(self) -> Configuration:
+        """The configuration that the daemon runs with."""
+        return self.configuration if self.daemon is None else self.daemon.configuration
+
+    @property
     def zero(self) -> MachineZero:
         """The machine zero that is used."""
         assert self.daemon is not None
@@ -223,12 +240,10 @@ class World:
         """A person has looked at a gauge."""
         self.clients.ask({"class": "ACCEPT", "gauge": gauge})
 
-    def adopt(self, model: Path | None) -> None:
-        """A person adopts a model file, or none."""
-        if model is None:
-            self.clients.ask({"class": "MODEL", "file": ""})
-        else:
-            self.clients.ask({"class": "MODEL", "file": str(model)}, model)
+    def adopt(self, model: Path | None, shadow: bool = False) -> None:
+        """A person adopts a model file, or none; or lets it run as the shadow."""
+        beside = {"shadow": True} if shadow else {}
+        self.clients.ask({"class": "MODEL", "file": "" if model is None else str(model), **beside}, model)
 
     def release(self) -> None:
         """A person takes the controller's role away."""
@@ -281,7 +296,7 @@ class World:
         error_um = math.nan
         with self._live.now() as truth:
             if setpoint.values is not None:
-                error_um = 1e3 * math.dist(_tip_mm(setpoint, truth.tip_frame), _true_tip_mm(setpoint, truth))
+                error_um = 1e3 * math.dist(tip_mm(setpoint, truth.tip_frame), true_tip_mm(setpoint, truth))
             moving = truth.phase == "moving"
         u_tip_um = math.nan if setpoint.u_tip_um is None else setpoint.u_tip_um
         told = Told(setpoint.time_s, setpoint.valid, setpoint.state, setpoint.reason, u_tip_um, error_um, moving)
@@ -290,19 +305,10 @@ class World:
             hear(setpoint, told)
 
 
-def _true_tip_mm(setpoint: Setpoint, truth: Truth) -> np.ndarray:
-    """Where the tip is; in machine-tool mode where it were if the scales were at their setpoints."""
-    assert setpoint.values is not None
-    if setpoint.mode is Mode.MACHINE_TOOL:
-        return truth.tip_for(setpoint.values.scale_setpoint_mm.tolist())
-    state = truth.look()
-    return state.tip_M if truth.tip_frame == "M" else state.tip_P
-
-
-def _tip_mm(setpoint: Setpoint, frame: str) -> np.ndarray:
-    values = setpoint.values
-    assert values is not None
-    return np.asarray(values.tip_M_mm if frame == "M" else values.tip_P_mm)
+def _hang_up(daemon: Daemon) -> None:
+    """Close the connections that a killed service had, as the kernel does."""
+    for session in daemon.service.publisher._sessions:
+        session.connection.close()
 
 
 @contextmanager
