@@ -12,9 +12,9 @@ from typing import Any
 from docs.generate.markdown import escape, heading, join, table, target
 from tests.injection.case import Case
 from tests.injection.cells.situation import Situation
-from tests.injection.cells.verdict import BEYOND_MOST, BEYOND_SHARE
+from tests.injection.verdict import BEYOND_MOST, BEYOND_SHARE
 
-# Written by `python -m tests.injection` and by `make faults`, each with `--write docs/faults.json`.
+# Written by `make faults OPTIONS="--write docs/faults.json"`.
 MEASURED = Path(__file__).parent.parent / "faults.json"
 Document = Mapping[str, Any]
 Result = Mapping[str, Any]
@@ -29,7 +29,7 @@ def measured() -> Document:
 
 def results(document: Document) -> Sequence[Result]:
     """Of each cell; none before `make faults` has been run."""
-    found: Sequence[Result] = document.get("cells", {}).get("results", ())
+    found: Sequence[Result] = document.get("cells", ())
     return found
 
 
@@ -52,14 +52,13 @@ def introduction(document: Document) -> str:
     """What the figures of the cells are; "" where there are none."""
     if not results(document):
         return ""
-    run = document["cells"]
     beyond = f"{BEYOND_SHARE:.0%}".replace("%", " %")
     return f"""\
-*Error of bound* is from `{run["command"]}` on {run["date"]}, which tries every fault in four
-situations: at rest, in motion from place to place, at a restart of the daemon, and on a computer on which twice as
-many programs compute as it has processors. The first number is the largest error of a valid setpoint, the second the
-bound that this setpoint stated as `u_tip_um`. Where a fault can be seen, no more than {beyond} of the setpoints may be
-valid and beyond their bound, and none beyond {BEYOND_MOST:g} times it.
+*Error of bound* is from the same run, which tries every fault in four situations: at rest, in motion from place to
+place, at a restart of the daemon, and on a busy computer, on which the daemon wakes late and stalls. The first number
+is the largest error of a valid setpoint, the second the bound that this setpoint stated as `u_tip_um`. Where a fault
+can be seen, no more than {beyond} of the setpoints may be valid and beyond their bound, and none beyond
+{BEYOND_MOST:g} times it.
 """
 
 

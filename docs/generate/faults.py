@@ -11,8 +11,8 @@ from docs.generate.fault_cells import Document, figures, introduction, measured,
 from docs.generate.markdown import codes, escape, fence, heading, join, link, table, target
 from tests.injection.case import Case, Way
 from tests.injection.cells.situation import Situation
+from tests.injection.machine import VOTES
 from tests.injection.matrix import FAULTS
-from tests.injection.rig import VOTES
 
 HEADER = ["what fails", "what must happen, and the way out", "largest error, valid", "shown, `ok` again after"]
 
@@ -37,14 +37,15 @@ def page_of(document: Document) -> str:
 
 def _introduction(document: Document) -> str:
     return f"""\
-... a gauge, a line, a process or a client fails. Each row of these tables is a test: an injector between the simulated
-tripod of `config/tripod-cmm.yaml` and the daemon does it to whole replies on real ports, and every setpoint that says
-`valid` is compared with the true tip of the simulated machine. The machine stands still, unless a row says that it
+... a gauge, a line, a process or a client fails. Each row of these tables is a test: it happens to the replies of the
+simulated tripod of `config/tripod-cmm.yaml`, or to the daemon, and every setpoint that says `valid` is compared with
+the true tip of the machine. All of it runs in virtual time, so that it shows the same every time; what clients do, and
+a sample of the others, run with real ports, sockets and processes. The machine stands still, unless a row says that it
 drives. Its owner has added to the configuration:
 
 {fence(yaml.safe_dump({"votes": VOTES}), "yaml")}
-The columns on the right are from one run of
-`{document["command"]}` on {document["date"]}:
+The columns on the right are from
+`{document["command"]}`:
 
 - *largest error* of any setpoint that was valid, from the beginning of the fault until the state was `ok` again.
   Without any fault it is 0.3 um, the noise of the gauges;
@@ -54,7 +55,7 @@ The columns on the right are from one run of
 
 [Limits and stale gauges](../explanation/limits-and-stale-gauges.md) explains the states,
 [the daemon's processes](../explanation/processes.md) who guards whom. `tests/system/test_fault_matrix.py` runs the
-rows, and `make soak` lets them happen at random.
+sample with real parts, and `make worlds` lets faults happen at random.
 """
 
 

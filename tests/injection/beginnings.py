@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import signal
+import math
 from collections.abc import Callable
 
 from tests.injection import faults
 from tests.injection.case import Begin
-from tests.injection.rig import InjectedMachine
+from tests.injection.machine import Machine
 
 # Where the scales stand when a fault begins: different for each, so that exchanged ones differ, and with more digits
 # than a display that has been set to fewer.
@@ -40,9 +40,9 @@ def shows(line: str, channel: str, number: float) -> Begin:
 def away(*lines: str, s: float = 1.0) -> Begin:
     """Unplugged for so long, and plugged in again as they were."""
 
-    def begin(machine: InjectedMachine) -> None:
+    def begin(machine: Machine) -> None:
         machine.injector.unplug(*lines)
-        machine.truth.rest_for(s)
+        machine.rest_for(s)
         machine.injector.plug(*lines)
 
     return begin
@@ -51,9 +51,9 @@ def away(*lines: str, s: float = 1.0) -> Begin:
 def back_with(line: str, channel: str, mm: float, s: float = 2.0) -> Begin:
     """Without power for so long; then the gauge shows another number than before."""
 
-    def begin(machine: InjectedMachine) -> None:
+    def begin(machine: Machine) -> None:
         machine.injector.unplug(line)
-        machine.truth.rest_for(s)
+        machine.rest_for(s)
         machine.injector.fault(line, faults.Off((channel,), mm))
         machine.injector.plug(line)
 
@@ -61,9 +61,9 @@ def back_with(line: str, channel: str, mm: float, s: float = 2.0) -> Begin:
 
 
 def while_driving(begin: Begin) -> Begin:
-    def both(machine: InjectedMachine) -> None:
+    def both(machine: Machine) -> None:
         begin(machine)
-        machine.truth.drive_away()
+        machine.drive_away()
 
     return both
 
@@ -71,10 +71,10 @@ def while_driving(begin: Begin) -> Begin:
 def before_driving(begin: Begin) -> Begin:
     """At rest, for longer than a poll takes; then the machine drives."""
 
-    def both(machine: InjectedMachine) -> None:
+    def both(machine: Machine) -> None:
         begin(machine)
-        machine.truth.rest_for(0.3)
-        machine.truth.drive_away()
+        machine.rest_for(0.3)
+        machine.drive_away()
 
     return both
 
@@ -82,7 +82,7 @@ def before_driving(begin: Begin) -> Begin:
 def mute(*lines: str) -> Begin:
     """No reply at all."""
 
-    def begin(machine: InjectedMachine) -> None:
+    def begin(machine: Machine) -> None:
         for line in lines:
             machine.injector.fault(line, faults.Lost(probability=1.0))
 
@@ -92,9 +92,9 @@ def mute(*lines: str) -> Begin:
 def unplugged_driving(line: str) -> Begin:
     """Unplugged, and plugged in again after the machine has driven."""
 
-    def begin(machine: InjectedMachine) -> None:
+    def begin(machine: Machine) -> None:
         machine.injector.unplug(line)
-        machine.truth.drive_away()
+        machine.drive_away()
         machine.injector.plug(line)
 
     return begin
@@ -105,51 +105,40 @@ def exchanged(one: str, other: str) -> Begin:
 
 
 def replugged_exchanged(one: str, other: str) -> Begin:
-    def begin(machine: InjectedMachine) -> None:
+    def begin(machine: Machine) -> None:
         machine.injector.unplug(one, other)
         machine.injector.exchange(one, other)
-        machine.truth.rest_for(0.5)
+        machine.rest_for(0.5)
         machine.injector.plug(one, other)
 
     return begin
 
 
 def flaps(*lines: str) -> Begin:
-    def begin(machine: InjectedMachine) -> None:
+    def begin(machine: Machine) -> None:
         for _ in range(6):
             machine.injector.replug(*lines)
-            machine.truth.rest_for(0.1)
+            machine.rest_for(0.1)
 
     return begin
 
 
-def sent(process: str, number: signal.Signals) -> Begin:
-    return lambda machine: machine.signal(process, number)
+def killed(process: str) -> Begin:
+    return lambda machine: machine.kill(process)
 
 
-def stopped(machine: InjectedMachine) -> None:
-    """The whole daemon is stopped for a second."""
-    machine.stop_for(1.0)
-
-
-def stalled(process: str, s: float) -> Begin:
-    """One process is stopped for so long."""
-
-    def begin(machine: InjectedMachine) -> None:
-        machine.signal(process, signal.SIGSTOP)
-        machine.truth.rest_for(s)
-        machine.signal(process, signal.SIGCONT)
-
-    return begin
+def stalled(process: str = "", s: float = math.inf) -> Begin:
+    """One process, or the whole daemon, is stopped for so long."""
+    return lambda machine: machine.stall(process, s)
 
 
 def at_zero(begin: Begin) -> Begin:
     """At machine zero, where a display shows 0 whatever its parameters; then the machine drives."""
 
-    def both(machine: InjectedMachine) -> None:
-        machine.truth.drive((0.0, 0.0, 0.0))
+    def both(machine: Machine) -> None:
+        machine.drive((0.0, 0.0, 0.0))
         begin(machine)
-        machine.truth.drive_away()
+        machine.drive_away()
 
     return both
 
@@ -157,15 +146,15 @@ def at_zero(begin: Begin) -> Begin:
 def without_power(line: str, make: Callable[[], faults.Fault], s: float = 1.0) -> Begin:
     """Without power for so long, and back with this fault, for long enough to be read again."""
 
-    def begin(machine: InjectedMachine) -> None:
+    def begin(machine: Machine) -> None:
         machine.injector.unplug(line)
-        machine.truth.rest_for(s)
+        machine.rest_for(s)
         machine.injector.fault(line, make())
         machine.injector.plug(line)
-        machine.truth.rest_for(REOPENED_S)
+        machine.rest_for(REOPENED_S)
 
     return begin
 
 
 def ports_exchanged(one: str, other: str) -> Begin:
-    return lambda machine: machine.exchange_ports(one, other)
+    return lambda machine: machine.reload((one, other))

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from enum import Enum
 
 from compd.setpoint_states import State
-from tests.injection.rig import InjectedMachine
+from tests.injection.machine import Machine
 
 # At rest without a fault the largest error of thousands of valid setpoints is 0.3 um: gauge noise.
 PUBLISHED_UM = 1.0
@@ -15,7 +15,7 @@ PUBLISHED_UM = 1.0
 INVALID = frozenset({State.STOP, State.FAULT})
 SUBSTITUTED = frozenset({State.HOLD, State.STOP, State.FAULT})
 
-Begin = Callable[[InjectedMachine], None]
+Begin = Callable[[Machine], None]
 
 
 class Way(Enum):
@@ -37,16 +37,16 @@ class Case:
     given, or may be where nothing must show. bound_um : of the error of any valid setpoint, from the beginning
     until the state is ok again. way : out of it. at_least_um : of what nothing shows, the error that it makes.
     watched_s : how long the fault lasts. lost : whether the daemon itself ends and the service manager starts it
-    again. sample : `.ci/run` runs it too. unseen : the blind spot (`compd check --what-cannot-be-seen`) of what
-    nothing shows, or not at once. drives : it drives the machine itself. expands : it needs a machine that expands,
-    `InjectedMachine.expands`.
+    again. real : it is tried with real ptys, sockets and processes, too.
+    virtual : it is tried in virtual time. unseen : the blind spot (`compd check --what-cannot-be-seen`) of what
+    nothing shows, or not at once. drives : it drives the machine itself. expands : it needs a machine that expands.
     """
 
     id: str
     group: str
     fault: str
     injected: str
-    begin: Callable[[InjectedMachine], None]
+    begin: Begin
     way: Way
     states: frozenset[State] = frozenset()
     names: str = ""
@@ -54,7 +54,8 @@ class Case:
     at_least_um: float = 0.0
     watched_s: float = 1.5
     lost: bool = False
-    sample: bool = False
+    real: bool = False
+    virtual: bool = True
     unseen: str = ""
     drives: bool = False
     expands: bool = False

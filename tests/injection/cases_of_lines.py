@@ -22,7 +22,6 @@ LINES: tuple[Case, ...] = (
         "one reply of scale 1 dropped",
         on("scale_1", lambda: faults.Lost(count=1)),
         Way.UNDISTURBED,
-        sample=True,
     ),
     Case(
         "scale-short",
@@ -119,7 +118,6 @@ LINES: tuple[Case, ...] = (
         Way.ITSELF,
         SUBSTITUTED,
         "frame_u",
-        sample=True,
     ),
     Case(
         "cabinet-reply-behind",
@@ -192,6 +190,7 @@ LINES: tuple[Case, ...] = (
         Way.ITSELF,
         INVALID,
         "scale 1",
+        real=True,
     ),
     Case(
         "cabinet-flaps",

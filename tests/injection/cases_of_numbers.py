@@ -31,7 +31,6 @@ NUMBERS: tuple[Case, ...] = (
         Way.ITSELF,
         SUBSTITUTED,
         "u1",
-        sample=True,
     ),
     Case(
         "register-inf",
@@ -74,7 +73,6 @@ NUMBERS: tuple[Case, ...] = (
         INVALID,
         "scale 1",
         bound_um=3.0,
-        sample=True,
         unseen="stuck_scale",
         drives=True,
     ),
@@ -158,7 +156,6 @@ NUMBERS: tuple[Case, ...] = (
         Way.ACCEPTED,
         INVALID,
         "scale",
-        sample=True,
     ),
     Case(
         "scales-replugged",

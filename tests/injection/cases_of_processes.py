@@ -2,40 +2,38 @@
 
 from __future__ import annotations
 
-import signal
-
 from tests.injection import clients
 from tests.injection.beginnings import (
-    sent,
+    killed,
     stalled,
-    stopped,
 )
 from tests.injection.case import Case, Way
 
 PROCESSES = "Processes"
 CLIENTS = "Clients"
+KILL, STOP = "SIGKILL", "SIGSTOP"
 
 PROCESSES_AND_CLIENTS: tuple[Case, ...] = (
     # --- processes
     *(
         Case(
-            f"{process}-{number.name.lower()}",
+            f"{process}-{signal.lower()}",
             PROCESSES,
-            f"the process `{process}` {verb}",
-            f"{number.name}",
-            sent(process, number),
+            f"the process `{process}` {'is killed' if signal == KILL else 'hangs'}",
+            signal,
+            killed(process) if signal == KILL else stalled(process),
             Way.ITSELF,
             watched_s=1.0,
             lost=process in ("service", "supervisor"),
-            sample=process == "loop" and number is signal.SIGKILL,
+            real=process != "supervisor",
         )
-        for process, number, verb in (
-            ("loop", signal.SIGKILL, "is killed"),
-            ("loop", signal.SIGSTOP, "hangs"),
-            ("acquisition", signal.SIGKILL, "is killed"),
-            ("acquisition", signal.SIGSTOP, "hangs"),
-            ("service", signal.SIGKILL, "is killed"),
-            ("supervisor", signal.SIGKILL, "is killed"),
+        for process, signal in (
+            ("loop", KILL),
+            ("loop", STOP),
+            ("acquisition", KILL),
+            ("acquisition", STOP),
+            ("service", KILL),
+            ("supervisor", KILL),
         )
     ),
     Case(
@@ -43,7 +41,7 @@ PROCESSES_AND_CLIENTS: tuple[Case, ...] = (
         PROCESSES,
         "the whole daemon is stopped and goes on",
         "SIGSTOP, 1 s later SIGCONT",
-        stopped,
+        stalled(s=1.0),
         Way.ITSELF,
         watched_s=1.0,
     ),
@@ -58,7 +56,16 @@ PROCESSES_AND_CLIENTS: tuple[Case, ...] = (
     ),
     # --- clients
     *(
-        Case(f"client-{name}", CLIENTS, what, injected, clients.attack(name), Way.UNDISTURBED, sample=name == "status")
+        Case(
+            f"client-{name}",
+            CLIENTS,
+            what,
+            injected,
+            clients.attack(name),
+            Way.UNDISTURBED,
+            real=True,
+            virtual=False,
+        )
         for name, (what, injected) in clients.ATTACKS.items()
     ),
 )

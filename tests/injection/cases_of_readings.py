@@ -27,7 +27,6 @@ READINGS: tuple[Case, ...] = (
         "2.0034 read as 2.7034, once",
         on("scale_1", lambda: faults.OneDigit("position", -1)),
         Way.UNDISTURBED,
-        sample=True,
     ),
     Case(
         "scale-1mm-once",
@@ -44,7 +43,6 @@ READINGS: tuple[Case, ...] = (
         "scale 1 + 50 um, once",
         once("scale_1", "position", 0.05),
         Way.UNDISTURBED,
-        sample=True,
     ),
     Case(
         "frame-u1-once",
@@ -53,7 +51,6 @@ READINGS: tuple[Case, ...] = (
         "u1 + 50 um, once",
         once("frame_u", "u1", 0.05),
         Way.UNDISTURBED,
-        sample=True,
     ),
     Case(
         "frame-t1-once",
@@ -90,7 +87,6 @@ READINGS: tuple[Case, ...] = (
         Way.ACCEPTED,
         INVALID,
         "scale 1",
-        sample=True,
     ),
     Case(
         "scale-jumps-1mm",
@@ -103,15 +99,15 @@ READINGS: tuple[Case, ...] = (
         "scale 1",
     ),
     Case(
-        "scale-jumps-30um",
+        "scale-jumps-10um",
         FROM_NOW_ON,
         "a scale jumps by less than its link can move between two readings",
-        "scale 1 + 30 um from now on",
-        always("scale_1", "position", 0.03),
+        "scale 1 + 10 um from now on",
+        always("scale_1", "position", 0.01),
         Way.UNSEEN,
         names="scale 1",
-        bound_um=50.0,
-        at_least_um=35.0,
+        bound_um=20.0,
+        at_least_um=10.0,
         unseen="small_jump",
     ),
     Case(
@@ -156,7 +152,6 @@ READINGS: tuple[Case, ...] = (
         Way.ACCEPTED,
         INVALID,
         "scale 1",
-        sample=True,
         watched_s=REOPENED_S,
     ),
     Case(
@@ -190,7 +185,7 @@ READINGS: tuple[Case, ...] = (
         Way.ITSELF,
         INVALID,
         "scale 1",
-        sample=True,
+        real=True,
     ),
     Case(
         "scale-unplugged-driving",
@@ -223,5 +218,6 @@ READINGS: tuple[Case, ...] = (
         Way.ITSELF,
         SUBSTITUTED,
         "cabinet",
+        real=True,
     ),
 )

@@ -122,7 +122,7 @@ SIGNALS: tuple[Case, ...] = (
         SIGNAL,
         "no fault: the machine leaves after a long rest",
         "all links drive 7 mm",
-        lambda machine: machine.truth.drive_away(),
+        lambda machine: machine.drive_away(),
         Way.UNDISTURBED,
         bound_um=math.inf,
         unseen="departure_from_rest",

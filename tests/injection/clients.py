@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from tests.support.paths import ROOT
 
 if TYPE_CHECKING:
-    from tests.injection.rig import InjectedMachine
+    from tests.injection.machine import Machine
 
 CONNECTED_WITHIN_S = 10.0
 # Between one attack and the next: the attack is meant to last, and not to take a processor.
@@ -218,7 +218,7 @@ def main(name: str, unix: str, host: str, port: str, *tip_mm: str) -> None:
         _ATTACKS[name](Attacked(unix, (host, int(port)), [float(mm) for mm in tip_mm]))
 
 
-def attack(name: str) -> Callable[[InjectedMachine], None]:
+def attack(name: str) -> Callable[[Machine], None]:
     """For the matrix."""
     return lambda machine: machine.attack(name)
 

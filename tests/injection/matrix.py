@@ -1,8 +1,8 @@
 """The fault matrix: what fails, what is injected for it, what must happen, and how the daemon comes out of it.
 
-One table for the test (tests/system/test_fault_matrix.py), the run that measures (`python -m tests.injection`), the
-soak (`python -m tests.soak`) and the page of the documentation (docs/generate/faults.py). The machine is the shipped
-tripod, at rest with its scales at `REST_MM`, unless a case says that it drives.
+One table for the run in virtual time (`python -m tests.injection`), the sample with real parts
+(tests/system/test_fault_matrix.py) and the page of the documentation (docs/generate/faults.py). The machine is the
+shipped tripod, at rest with its scales at `REST_MM`, unless a case says that it drives.
 """
 
 from __future__ import annotations
@@ -19,3 +19,5 @@ from tests.injection.cases_of_thermometers import THERMOMETERS
 MATRIX: tuple[Case, ...] = (*READINGS, *LINES, *NUMBERS, *PROCESSES_AND_CLIENTS)
 # With those of which nothing is demanded but that the setpoints keep their bound: `make faults`.
 FAULTS: tuple[Case, ...] = (*MATRIX, *SIGNALS, *DISPLAYS, *THERMOMETERS)
+VIRTUAL = tuple(case for case in FAULTS if case.virtual)
+REAL = tuple(case for case in MATRIX if case.real)

@@ -9,14 +9,16 @@ from __future__ import annotations
 import errno
 import os
 import selectors
+import socket
 import threading
 import traceback
 import uuid
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Any
+from weakref import WeakSet
 
 from compd.files import Content
 from compd.live.system import ForkedProcess, Privileges, System
@@ -72,6 +74,7 @@ class VirtualSelector(selectors.EpollSelector):
     def __init__(self, hub: Hub) -> None:
         super().__init__()
         self._hub = hub
+        self._closed = False
         hub.watch(self.fileno())
 
     def select(self, timeout: float | None = None) -> list[tuple[selectors.SelectorKey, int]]:
@@ -82,7 +85,16 @@ class VirtualSelector(selectors.EpollSelector):
             ready = super().select(0)
         return ready
 
+    def cut_connections(self) -> None:
+        """End the connections that it waits for, as the kernel does for a process that has gone; listeners stay."""
+        for key in () if self._closed else list(self.get_map().values()):
+            end = key.fileobj
+            if isinstance(end, socket.socket) and not end.getsockopt(socket.SOL_SOCKET, socket.SO_ACCEPTCONN):
+                with suppress(OSError), end:
+                    end.shutdown(socket.SHUT_RDWR)
+
     def close(self) -> None:
+        self._closed = True
         self._hub.forget(self.fileno())
         super().close()
 
@@ -127,6 +139,7 @@ class VirtualProcess(ForkedProcess):
         self.descriptor = os.eventfd(0, os.EFD_NONBLOCK | os.EFD_CLOEXEC)
         self._system = system
         self._actors: list[Actor] = []
+        self.selectors: WeakSet[VirtualSelector] = WeakSet()
         self._exit_code: int | None = None
         self.spawn(lambda: self._end(self._main(run)))
 
@@ -175,6 +188,8 @@ class VirtualProcess(ForkedProcess):
         for actor in self._actors:
             self._system.owner.pop(actor, None)
             self._system.hub.kill(actor)
+        for selector in self.selectors:
+            selector.cut_connections()
         os.eventfd_write(self.descriptor, 1)
 
 
@@ -221,7 +236,9 @@ class VirtualSystem(System):
         return self.hub.wait(event, timeout_s)
 
     def selector(self) -> selectors.BaseSelector:
-        return VirtualSelector(self.hub)
+        selector = VirtualSelector(self.hub)
+        self.process_of(this_actor()).selectors.add(selector)
+        return selector
 
     # --- threads and processes -------------------------------------------------------------------------
 
@@ -232,6 +249,7 @@ class VirtualSystem(System):
     def start(self, run: Callable[[], object], name: str) -> VirtualProcess:
         """Start a process that no other one waits for: the supervisor's, a client's."""
         process = self.processes[name] = VirtualProcess(self, run, name, 1000 + len(self.owner))
+        self.hub.pause(name, 0.0)  # the one of that name before it may have been stopped
         return process
 
     def thread(self, run: Callable[[], object], name: str) -> threading.Thread:

@@ -42,15 +42,17 @@ class Wire:
     fault : of its replies; may be exchanged at any time.
     plugged : whether there is a connection at all.
     replies : how many were sent, faults included.
+    listener : its devices. request : that `fault` is asked for the reply to.
     """
 
     def __init__(self, hub: Hub, settings: PolledLineSettings, devices: Sequence[Any]) -> None:
         self.fault: Fault = whole
         self.plugged = True
         self.replies = 0
+        self.request = b""
         twin = polled_definition(settings).twin
         self.character_s = twin.character_s(settings)
-        self._listener = twin.listener(settings, devices)
+        self.listener = twin.listener(settings, devices)
         self._hub = hub
         self._ports: list[WirePort] = []
         self._free_s = 0.0  # when the device has sent its last reply
@@ -79,10 +81,11 @@ class Wire:
         self._hub.at(max(heard_s, self._free_s) + rng.uniform(*SAMPLES_AFTER_S), lambda: self._answer(port, request))
 
     def _answer(self, port: WirePort, request: bytes) -> None:
-        reply = self._listener.receive(request)
+        reply = self.listener.receive(request)
         if not reply:
             return
         self.replies += 1
+        self.request = request
         begins_s = self._hub.now_s + self._hub.rng.uniform(*REPLIES_AFTER_S)
         for delay_s, piece in self.fault(reply):
             ends_s = begins_s + delay_s + (len(piece) * self.character_s or PACKET_S)

@@ -18,29 +18,29 @@ from copy import deepcopy
 from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
-from unittest.mock import patch
 
 import numpy as np
-import structlog
 import yaml
 
 from compd.configuration import Configuration, load
 from compd.documents import read_document
 from compd.errors import CompdError
 from compd.live.daemon import Daemon
-from compd.live.loop import Loop, Setpoint
+from compd.live.loop import Setpoint
 from compd.live.machine import MachineZero
 from compd.live.run_daemon import run_daemon
 from compd.plugins import SIMULATED_GAUGES
 from compd.plugins import load as load_plugin
 from compd.setpoint_states import State
 from compd.simulation import World as Truth
+from compd.simulation.truth.cause import Cause
 from compd.simulation.truth.motion import DRIVES, Drives
 from compd.simulation.truth.strengths import Strengths
 from compd.simulation.wires.server import STEP_S, LiveWorld, Sensing
 from tests.worlds.clients import Clients
 from tests.worlds.controller import Controller
 from tests.worlds.hub import Hub
+from tests.worlds.observed import logged, observed
 from tests.worlds.tips import tip_mm, true_tip_mm
 from tests.worlds.virtual_system import VirtualSystem
 from tests.worlds.wires import VirtualPorts, Wire
@@ -152,14 +152,14 @@ class World:
     def closed(self, daemon: Daemon) -> None:
         """A daemon has closed its descriptors."""
         self._to_close.remove(daemon)
-        _hang_up(daemon)
 
     def kill(self, process: str) -> None:
-        """SIGKILL for a process of the daemon."""
+        """SIGKILL for a process of the daemon; the others end with the supervisor, which is started anew."""
         for name in self._named(process):
             self.system.processes[name].kill()
-            if name == SERVICE and self.daemon is not None:
-                _hang_up(self.daemon)
+        if process == SUPERVISOR and self._on:
+            self.stop()
+            self.hub.at(self.hub.now_s + RESTART_S, self.start)
 
     def kill_acquisition(self) -> None:
         """End the process that polls the gauges."""
@@ -179,10 +179,14 @@ class World:
             name for name, process in self.system.processes.items() if process.running and not name.startswith("client")
         ]
 
-    def restart(self) -> None:
-        """A person restarts the unit."""
+    def end(self) -> None:
+        """A person stops the unit."""
         self._on = False
         self.system.send_signal(signal.SIGTERM)
+
+    def restart(self) -> None:
+        """A person restarts the unit."""
+        self.end()
         self.hub.at(self.hub.now_s + 2.0, self.start)
 
     def reload(self, change: Callable[[dict[str, Any]], None] = lambda document: None) -> None:
@@ -292,7 +296,8 @@ class World:
                 return True
         return False
 
-    def _note(self, setpoint: Setpoint) -> None:
+    def note(self, setpoint: Setpoint) -> None:
+        """A loop has made a setpoint."""
         error_um = math.nan
         with self._live.now() as truth:
             if setpoint.values is not None:
@@ -305,12 +310,6 @@ class World:
             hear(setpoint, told)
 
 
-def _hang_up(daemon: Daemon) -> None:
-    """Close the connections that a killed service had, as the kernel does."""
-    for session in daemon.service.publisher._sessions:
-        session.connection.close()
-
-
 @contextmanager
 def built(
     path: Path,
@@ -318,10 +317,11 @@ def built(
     drives: Drives = DRIVES,
     change: Callable[[dict[str, Any]], None] = lambda document: None,
     strengths: Callable[[Configuration], Strengths | None] = lambda configuration: None,
+    causes: Callable[[Configuration], Sequence[Cause]] = lambda configuration: (),
 ) -> Iterator[World]:
     """A world of a configuration, at machine zero, ready.
 
-    change : of its document before it is loaded. strengths : of the errors of the machine.
+    change : of its document before it is loaded. strengths : of the errors of the machine. causes : beside them.
     """
     random.seed(seed)
     with ExitStack() as stack:
@@ -329,22 +329,27 @@ def built(
         stack.callback(shutil.rmtree, directory, ignore_errors=True)
         document = deepcopy(read_document(path).data)
         change(document)
-        document["state"] = {"directory": str(directory / "state")}
+        document["state"] = {**document.get("state", {}), "directory": str(directory / "state")}
         sockets = document.setdefault("sockets", {})
         sockets["unix"] = {"path": str(directory / "socket")}
         for other in ("tcp", "udp"):
             sockets.pop(other, None)
         (directory / path.name).write_text(yaml.safe_dump(document, sort_keys=False))
         configuration = load(directory / path.name)
-        errors = strengths(configuration)
         truth = Truth(
-            configuration.geometry, configuration.wiring, seed, zero_hold_s=1e9, strengths=errors, drives=drives
+            configuration.geometry,
+            configuration.wiring,
+            seed,
+            zero_hold_s=1e9,
+            strengths=strengths(configuration),
+            causes=causes(configuration),
+            drives=drives,
         )
         hub = Hub(seed)
         world = World(hub, configuration, truth, directory)
-        stack.enter_context(_logged(world))
+        stack.enter_context(logged(world))
 
-        stack.enter_context(_observed(world))
+        stack.enter_context(observed(world))
         stack.callback(hub.close)
         stack.callback(world.stop)
         world.start()
@@ -353,46 +358,3 @@ def built(
         assert world.until_ok(ZERO_WITHIN_S), (world.told[-1:], world.clients.answers, world.died)
         world.clients.watch(WATCHED_HZ)
         yield world
-
-
-@contextmanager
-def _observed(world: World) -> Iterator[None]:
-    """Daemons and loops tell their world of themselves."""
-
-    class ObservedDaemon(Daemon):
-        def __init__(self, *arguments: Any, **named: Any) -> None:
-            super().__init__(*arguments, **named)
-            world.begun(self)
-
-        def close(self, after: Daemon | None = None) -> None:
-            super().close(after)
-            world.closed(self)
-
-    class ObservedLoop(Loop):
-        def __init__(self, cycle: Any, latest: Any, commands: Any, sinks: Any, *arguments: Any) -> None:
-            super().__init__(cycle, latest, commands, [*sinks, world._note], *arguments)
-
-    with (
-        patch("compd.live.run_daemon.Daemon", ObservedDaemon),
-        patch("compd.live.processes.loop_process.Loop", ObservedLoop),
-    ):
-        yield
-
-
-@contextmanager
-def _logged(world: World) -> Iterator[None]:
-    """The daemon's log goes to its world."""
-
-    def note(_logger: Any, _method: str, entry: Any) -> Any:
-        world.log.append({**entry, "time_s": world.hub.now_s})
-        raise structlog.DropEvent
-
-    before = structlog.get_config()
-    structlog.configure(
-        processors=[structlog.processors.add_log_level, structlog.processors.format_exc_info, note],
-        cache_logger_on_first_use=False,
-    )
-    try:
-        yield
-    finally:
-        structlog.configure(**before)

@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 import random
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 from tests.injection.case import Case
 from tests.injection.cases_of_numbers import STUCK
 from tests.injection.cells.situation import Situation
-from tests.injection.matrix import FAULTS
+from tests.injection.matrix import VIRTUAL
 
 PAIRS, PAIRS_SEED = 150, 36
-# `--sample` takes one in so many: no multiple of 2, or of four situations it would take one or two.
-SAMPLE_EVERY = 7
 NO_FAULT = "no-fault"
 
 
@@ -47,11 +45,6 @@ class Cell:
         return any(case.expands for case in self.cases)
 
     @property
-    def alone(self) -> bool:
-        """Whether nothing may run beside it."""
-        return self.situation is Situation.LOAD
-
-    @property
     def drives_itself(self) -> bool:
         return any(case.drives for case in self.cases)
 
@@ -67,19 +60,14 @@ WITHOUT_FAULT_S = 10.0
 
 def all_cells(pairs: int = PAIRS, seed: int = PAIRS_SEED) -> list[Cell]:
     """Every situation without a fault and with each, then the pairs."""
-    single: list[tuple[Case, ...]] = [(), *((case,) for case in FAULTS)]
+    single: list[tuple[Case, ...]] = [(), *((case,) for case in VIRTUAL)]
     cells = [Cell(cases, s) for cases in single for s in Situation if all(s.fits(case) for case in cases)]
     return [*cells, *_pairs(pairs, random.Random(seed))]
 
 
-def sample(cells: Sequence[Cell]) -> list[Cell]:
-    """A part of them with something of every kind."""
-    return list(cells[::SAMPLE_EVERY])
-
-
 def _pairs(count: int, chance: random.Random) -> Iterator[Cell]:
     """Two faults that can be seen, and a situation that fits both; no pair twice."""
-    candidates = [case for case in FAULTS if not (case.unseen or case.lost or case.drives)]
+    candidates = [case for case in VIRTUAL if not (case.unseen or case.lost or case.drives)]
     drawn: set[str] = set()
     while len(drawn) < count:
         cases = tuple(chance.sample(candidates, 2))

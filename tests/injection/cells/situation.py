@@ -2,22 +2,17 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from enum import Enum
 
 from tests.injection.beginnings import REST_MM
 from tests.injection.case import Case
-from tests.injection.cases_of_processes import CLIENTS, PROCESSES
-from tests.injection.rig import InjectedMachine
+from tests.injection.cases_of_processes import PROCESSES
+from tests.injection.virtual import VirtualMachine
 
 # Where a machine in motion drives, one after the other: no link always the same way.
 PLACES_MM = ((9.0, 11.0, 14.0), (-6.0, 9.0, 3.0), (8.0, -7.0, 12.0), REST_MM)
-# Cases whose controllers command the place where the machine stands: one that drives does not follow them.
-COMMANDING = "client-target"
-# More than there are processors, so that the daemon has to wait for one.
-BUSY_PROCESSES = 2 * (os.cpu_count() or 1)
 
 
 class Situation(Enum):
@@ -29,25 +24,21 @@ class Situation(Enum):
     LOAD = "busy computer"
 
     def fits(self, case: Case) -> bool:
-        """Whether a fault can be tried so. A fault that drives is in motion by itself; one of the daemon's processes
-        or clients is none of a daemon that starts."""
-        match self:
-            case Situation.RESTART:
-                return not case.drives and case.group not in (PROCESSES, CLIENTS)
-            case Situation.MOTION:
-                return not case.id.startswith(COMMANDING)
-        return not case.drives
+        """Whether a fault can be tried so. A fault that drives is in motion by itself; one of the daemon's processes is
+        none of a daemon that starts."""
+        if self is Situation.MOTION:
+            return True
+        return not case.drives and not (self is Situation.RESTART and case.group == PROCESSES)
 
     @contextmanager
-    def lasting(self, machine: InjectedMachine) -> Iterator[None]:
+    def lasting(self, machine: VirtualMachine) -> Iterator[None]:
         """During the block, but for a restart."""
         match self:
             case Situation.MOTION:
-                with machine.truth.shuttling(PLACES_MM):
-                    machine.truth.wait_for_motion()
+                with machine.shuttling(PLACES_MM):
                     yield
             case Situation.LOAD:
-                with machine.busy(BUSY_PROCESSES):
+                with machine.busy():
                     yield
             case _:
                 yield

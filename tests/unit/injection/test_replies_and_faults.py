@@ -23,9 +23,7 @@ from tests.injection.faults import (
 )
 from tests.injection.line_faults import FaultOfLine, sent_through
 from tests.injection.replies import Display, HeadsUnit, Protocol, Registers, crc16
-from tests.injection.rig import Verdict
 from tests.injection.signal_faults import Coarse, Hum, Noisy, Scaled, Steps
-from tests.support.watching import Seen
 
 FLOATS = [
     {"name": "u1", "address": 0, "type": "float32"},
@@ -142,13 +140,3 @@ def test_noise_has_its_deviation_and_follows_from_the_seed() -> None:
     assert shown(1) == shown(1) != shown(2)
     assert np.std(shown(1)) == pytest.approx(0.005, rel=0.1)
     assert np.mean(shown(1)) == pytest.approx(-1.2345, abs=0.001)
-
-
-@pytest.mark.parametrize("wrong", [[1.0, 2.0, 3.5], [1.0, 2.0, math.nan]])
-def test_a_wrong_valid_setpoint_is_found_among_right_ones(wrong: list[float]) -> None:
-    verdict, truth = Verdict(), np.array([1.0, 2.0, 3.0])
-    for tip_mm in ([1.0, 2.0, 3.0002], wrong, [1.0, 2.0, 3.0]):
-        verdict.add(Seen(0.0, {"state": "ok", "valid": True, "reason": "", "tip_M_mm": tip_mm}), truth)
-    assert verdict.worst_um > 400.0
-    assert verdict.worst["tip_M_mm"] == wrong
-    assert verdict.judged == 3

@@ -5,9 +5,9 @@ from __future__ import annotations
 import random
 
 from tests.worlds.faults.fault import Fault
-from tests.worlds.faults.layers import delay
+from tests.worlds.faults.layers import delay, disturb
 from tests.worlds.hub import usually_late
-from tests.worlds.wires import whole
+from tests.worlds.wires import lost, whole
 from tests.worlds.world import ACQUISITION, LOOP, SERVICE, World
 
 PROCESSES = (ACQUISITION, LOOP, SERVICE)
@@ -64,7 +64,7 @@ def clock_set(world: World, target: str, by_s: float) -> Fault:
 # --- for tests that need one moment ------------------------------------------------------------------------------
 
 
-def keep_busy(world: World, stalls_every_s: float, late_share: float = 0.03, late_s: float = 8e-3) -> None:
+def keep_busy(world: World, stalls_every_s: float, late_share: float = 0.03, late_s: float = 8e-3) -> Fault:
     """Other programs compute: some polls are late, replies are lost now and then, and all lines stall for a moment."""
     hub = world.hub
 
@@ -72,10 +72,21 @@ def keep_busy(world: World, stalls_every_s: float, late_share: float = 0.03, lat
         return usually_late(rng) + (rng.uniform(0.0, late_s) if rng.random() < late_share else 0.0)
 
     def stall() -> None:
+        if not fault.present:
+            return
         hub.pause(ACQUISITION, hub.now_s + hub.rng.uniform(*STALL_S))
         hub.at(hub.now_s + hub.rng.expovariate(1.0 / stalls_every_s), stall)
 
+    def end() -> None:
+        del hub.lateness[ACQUISITION]
+        for remove in removes:
+            remove()
+
     hub.lateness[ACQUISITION] = lateness
-    for line in world.configuration.lines:
-        world.wires[line].fault = lambda reply: [] if hub.rng.random() < LOST_SHARE else whole(reply)
+    removes = [
+        disturb(world.wires[line], lambda reply: lost(reply) if hub.rng.random() < LOST_SHARE else whole(reply))
+        for line in world.configuration.lines
+    ]
+    fault = Fault(world, end)
     hub.at(hub.now_s + hub.rng.expovariate(1.0 / stalls_every_s), stall)
+    return fault

@@ -6,12 +6,10 @@ import math
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
-from typing import Any
-
-import numpy as np
+from statistics import median
 
 from compd.setpoint_states import Mode
-from tests.injection.truth import Truth
+from tests.injection.machine import Held, Machine
 from tests.support.watching import Message, Seen
 
 # Of the cycles of a cell so many may have a setpoint beyond its bound, which is one of 95 %; none beyond twice.
@@ -27,12 +25,13 @@ def tip_bound_um(setpoint: Message) -> float:
 
 @dataclass
 class Verdict:
-    """What was published in a cell.
+    """What was published while a fault lasted.
 
     held : valid setpoints whose true tip is known. beyond : of them, in error by more than their bound. unbounded :
     of them, without a bound. worst_um, worst_bound_um : the largest error, and the bound of that setpoint. most :
-    largest error over its bound. bound_um : median. error_95_um : of the errors. late : valid setpoints whose target
-    is older than `TARGET_LATE_S`. target_late_s : age of the oldest target of a valid setpoint, by its id.
+    largest error over its bound. worst_at_rest_um, worst : the largest error at rest, and that setpoint. bound_um :
+    median. error_95_um : of the errors. late : valid setpoints whose target is older than `TARGET_LATE_S`.
+    target_late_s : age of the oldest target of a valid setpoint, by its id. longest_reason : in bytes.
     """
 
     setpoints: int = 0
@@ -47,6 +46,9 @@ class Verdict:
     error_95_um: float = math.nan
     late: int = 0
     target_late_s: float = math.nan
+    worst_at_rest_um: float = math.nan
+    worst: Message = field(default_factory=dict)
+    longest_reason: int = 0
     states: dict[str, int] = field(default_factory=dict)
     reasons: list[str] = field(default_factory=list)
 
@@ -70,39 +72,45 @@ class Verdict:
         return problems
 
 
-def judge(truth: Truth, seen: Sequence[Seen]) -> Verdict:
-    """Ask for the truth once more first: the last ones are held against it."""
-    truth.rest_for(0.0)
-    valid = [one.setpoint for one in seen if one["valid"]]
+def judge(machine: Machine, seen: Sequence[Seen]) -> Verdict:
+    """Hold setpoints against the truth, once they have all come."""
+    machine.rest_for(0.0)
+    right = [one for one in seen if one["valid"]]
+    valid = [one.setpoint for one in right]
     states = Counter(str(one["state"]) for one in seen)
     reasons = Counter(str(one["reason"]) for one in seen if one["reason"])
-    verdict = Verdict(len(seen), len(valid), states=dict(states), reasons=[r[:200] for r, _ in reasons.most_common(3)])
+    verdict = Verdict(len(seen), len(valid), states=dict(states), reasons=[r[:300] for r, _ in reasons.most_common(5)])
+    verdict.longest_reason = max((len(reason.encode()) for reason in reasons), default=0)
     ages_s = list(_target_ages_s(valid))
     verdict.target_late_s = max(ages_s, default=math.nan)
     verdict.late = sum(age_s > TARGET_LATE_S for age_s in ages_s)
-    if valid:
-        _hold(verdict, valid, truth.tips_mm([setpoint["time_s"] for setpoint in valid]))
+    _hold(verdict, list(zip(machine.hold(right), valid, strict=True)))
     return verdict
 
 
-def _hold(verdict: Verdict, valid: Sequence[Message], true_mm: Any) -> None:
-    known = np.isfinite(true_mm[:, 0])
-    tips_mm = np.array([setpoint["tip_M_mm"] for setpoint in valid], dtype=float)
-    errors_um = np.linalg.norm(tips_mm - true_mm, axis=1)[known] * 1e3
-    errors_um[~np.isfinite(errors_um)] = math.inf
-    bounds_um = np.array([tip_bound_um(setpoint) for setpoint in valid])[known]
-    verdict.held = len(errors_um)
-    if not verdict.held:
+def _hold(verdict: Verdict, held: Sequence[tuple[Held, Message]]) -> None:
+    # a tip that is no number is as wrong as can be
+    known = [
+        (math.inf if math.isnan(one.error_um) else one.error_um, one.rested, setpoint)
+        for one, setpoint in held
+        if one.error_um is not None
+    ]
+    verdict.held = len(known)
+    if not known:
         return
-    bounded = np.isfinite(bounds_um)
-    verdict.unbounded = int(np.sum(~bounded))
-    verdict.beyond = int(np.sum(errors_um > bounds_um))
-    worst = int(np.argmax(errors_um))
-    verdict.worst_um, verdict.worst_bound_um = float(errors_um[worst]), float(bounds_um[worst])
-    verdict.error_95_um = float(np.quantile(errors_um, 0.95, method="higher"))
-    if bounded.any():
-        verdict.most = float(np.max(errors_um[bounded] / bounds_um[bounded]))
-        verdict.bound_um = float(np.median(bounds_um[bounded]))
+    rests = [(error_um, setpoint) for error_um, rested, setpoint in known if rested]
+    if rests:
+        verdict.worst_at_rest_um, verdict.worst = max(rests, key=lambda one: one[0])
+    errors_um = [error_um for error_um, _, _ in known]
+    bounds_um = [tip_bound_um(setpoint) for _, _, setpoint in known]
+    shares = [error_um / bound_um for error_um, bound_um in zip(errors_um, bounds_um, strict=True)]
+    verdict.unbounded = sum(map(math.isnan, bounds_um))
+    verdict.beyond = sum(share > 1.0 for share in shares)
+    verdict.worst_um, verdict.worst_bound_um = max(zip(errors_um, bounds_um, strict=True), key=lambda one: one[0])
+    verdict.error_95_um = sorted(errors_um)[math.ceil(0.95 * len(errors_um)) - 1]
+    if bounded := [share for share in shares if not math.isnan(share)]:
+        verdict.most = max(bounded)
+        verdict.bound_um = median(bound_um for bound_um in bounds_um if not math.isnan(bound_um))
 
 
 def _target_ages_s(valid: Sequence[Message]) -> Iterator[float]:
