@@ -9,6 +9,7 @@ from typing import Any
 
 from compd.live.loop import Setpoint
 from compd.live.machine import MachineZero
+from compd.live.machine.machine_zero import FILE_NAME
 from tests.worlds.invariants import adopted_model, nothing_lost
 from tests.worlds.world import World
 
@@ -91,6 +92,8 @@ class Promises:
         if self._zero is None:
             self._zero = used
         taken, self._zero = self._zero, used
+        if not used and FILE_NAME in self._world.system.disk.torn:
+            return ""  # it is said that there is none
         return nothing_lost(taken, used)
 
     def broken(self, setpoint: Setpoint) -> str:

@@ -54,7 +54,7 @@ class Recovery:
         rows = [self._times.get(one.event.name, self._times["default"]) for one in self._awaited]
         ended_s = max(happening.fault.ended_s for happening in self._awaited)
         if any(row.person for row in rows):
-            if self._accepted_s is None and sight.told.state is State.FAULT:
+            if sight.told.state is State.NO_ZERO or (self._accepted_s is None and sight.told.state is State.FAULT):
                 return ""  # the person is on the way
             ended_s = max(ended_s, self._accepted_s or 0.0)
         within_s = max(row.within_s for row in rows)

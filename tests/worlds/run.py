@@ -15,7 +15,8 @@ from tests.worlds.blindness import Blindness, listening
 from tests.worlds.clients import Recording
 from tests.worlds.coverage import NO_FAULT, Coverage
 from tests.worlds.faults import begin
-from tests.worlds.faults.fault import mend, present
+from tests.worlds.faults.fault import Fault, mend, present
+from tests.worlds.faults.persons import zero
 from tests.worlds.invariants import mostly_valid
 from tests.worlds.machines import fast, machine_file, measured_errors
 from tests.worlds.plan import Event, Plan
@@ -91,6 +92,7 @@ class _Play:
         self._skipped: Counter[str] = Counter()
         self._asked = 0
         self._began_s = world.hub.now_s
+        self._taking: Fault | None = None
 
     def run(self, until: Callable[[Watch], bool], record_to: Path | None = None) -> Report:
         plan, watch, world = self._plan, self._watch, self._world
@@ -133,6 +135,9 @@ class _Play:
                 world.run(ACCEPTS_AFTER_S)
                 world.accept()
                 watch.accepted()
+            if watch.lacks_zero_for_s >= ACTS_AFTER_S and (self._taking is None or not self._taking.present):
+                self._asked += 1
+                self._taking = zero(world, "")
 
     def _begin(self, event: Event) -> None:
         try:

@@ -6,7 +6,6 @@ this process; only the waiting for them is virtual. Files are real ones in a dir
 
 from __future__ import annotations
 
-import errno
 import os
 import selectors
 import socket
@@ -23,6 +22,7 @@ from weakref import WeakSet
 from compd.files import Content
 from compd.live.system import ForkedProcess, Privileges, System
 from compd.live.system.realtime import Permission
+from tests.worlds.disk import Disk
 from tests.worlds.hub import Actor, Hub, this_actor
 from tests.worlds.wires import VirtualPorts
 
@@ -199,7 +199,7 @@ class VirtualSystem(System):
     Attributes
     ----------
     owner : the process of each actor. processes : those that run, by name. tracebacks : of exceptions that ended one.
-    calendar_s : by how much the calendar's clock was set, s. disk_is_full : whether no file can be written.
+    calendar_s : by how much the calendar's clock was set, s. disk : on which files are written.
     """
 
     def __init__(self, hub: Hub, ports: VirtualPorts) -> None:
@@ -210,7 +210,7 @@ class VirtualSystem(System):
         self.processes: dict[str, VirtualProcess] = {}
         self.tracebacks: list[str] = []
         self.calendar_s = 0.0
-        self.disk_is_full = False
+        self.disk = Disk(hub)
         self.boot()
 
     def boot(self) -> None:
@@ -298,6 +298,10 @@ class VirtualSystem(System):
     # --- files -----------------------------------------------------------------------------------------
 
     def write_files(self, contents: Mapping[Path, Content]) -> None:
-        if self.disk_is_full:
-            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        self.disk.write()
         super().write_files(contents)
+        self.disk.torn -= {path.name for path in contents}
+
+    def rename(self, path: Path, new: Path) -> None:
+        self.disk.rename()
+        super().rename(path, new)

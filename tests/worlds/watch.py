@@ -64,6 +64,7 @@ class Watch:
         self._departure = Departure(self.world)
         self.promises = Promises(self.world)
         self._faulty_since_s: float | None = None
+        self._without_zero_since_s: float | None = None
         self.world.hearers.append(self.hear)
         self.world.hub.every(LOOK_EVERY_S, lambda: self.blindness.look(self.world.hub.now_s))
 
@@ -93,6 +94,11 @@ class Watch:
         """How long the daemon has been asking for a person, s."""
         return 0.0 if self._faulty_since_s is None else self.world.hub.now_s - self._faulty_since_s
 
+    @property
+    def lacks_zero_for_s(self) -> float:
+        """How long the daemon has had no machine zero, s."""
+        return 0.0 if self._without_zero_since_s is None else self.world.hub.now_s - self._without_zero_since_s
+
     def hear(self, setpoint: Setpoint, told: Told) -> None:
         """Take in one setpoint."""
         self.setpoints += 1
@@ -120,6 +126,10 @@ class Watch:
             self._faulty_since_s = None
         elif self._faulty_since_s is None:
             self._faulty_since_s = now_s
+        if told.state is not State.NO_ZERO:
+            self._without_zero_since_s = None
+        elif self._without_zero_since_s is None:
+            self._without_zero_since_s = now_s
         if told.valid:
             self._before = setpoint
         if self.hear_also is not None:

@@ -39,6 +39,7 @@ from compd.simulation.truth.strengths import Strengths
 from compd.simulation.wires.server import STEP_S, LiveWorld, Sensing
 from tests.worlds.clients import Clients
 from tests.worlds.controller import Controller
+from tests.worlds.disk import recording_to
 from tests.worlds.hub import Hub
 from tests.worlds.observed import logged, observed
 from tests.worlds.tips import tip_mm, true_tip_mm
@@ -350,6 +351,7 @@ def built(
         stack.enter_context(logged(world))
 
         stack.enter_context(observed(world))
+        stack.enter_context(recording_to(world.system.disk))
         stack.callback(hub.close)
         stack.callback(world.stop)
         world.start()

@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 import random
+from pathlib import Path
+from typing import TypeVar
 
+from tests.worlds.disk import FULL, READ_ONLY
 from tests.worlds.faults.fault import Fault
 from tests.worlds.faults.layers import delay, disturb
 from tests.worlds.hub import usually_late
 from tests.worlds.wires import lost, whole
 from tests.worlds.world import ACQUISITION, LOOP, SERVICE, World
+
+T = TypeVar("T")
 
 PROCESSES = (ACQUISITION, LOOP, SERVICE)
 # Of a busy computer: how long it stalls, s, and share of the replies that are lost.
@@ -53,6 +58,35 @@ def reboot(world: World, target: str) -> Fault:
     """The computer starts anew."""
     world.reboot()
     return Fault(world, lasts_s=0.0)
+
+
+def disk_full(world: World, target: str, lasts_s: float) -> Fault:
+    """No file can be written for `lasts_s` (s)."""
+    return _of_disk(world.system.disk.refuses, FULL, world, lasts_s)
+
+
+def disk_read_only(world: World, target: str, lasts_s: float) -> Fault:
+    """The disk is mounted for reading only for `lasts_s` (s), after an error."""
+    return _of_disk(world.system.disk.refuses, READ_ONLY, world, lasts_s)
+
+
+def disk_slow(world: World, target: str, by_s: float, lasts_s: float) -> Fault:
+    """Every write takes `by_s` (s), for `lasts_s` (s)."""
+    return _of_disk(world.system.disk.slow_s, by_s, world, lasts_s)
+
+
+def torn_file(world: World, target: str, how: str) -> Fault:
+    """The computer starts anew after a power cut, which has torn the file of its state that was written last."""
+    world.reboot()
+    states = sorted(Path(world.running.state.directory).glob("*.json"), key=lambda path: path.stat().st_mtime_ns)
+    for path in states[-1:]:
+        world.system.disk.tear(path, how)
+    return Fault(world, lasts_s=0.0)
+
+
+def _of_disk(faults: list[T], fault: T, world: World, lasts_s: float) -> Fault:
+    faults.append(fault)
+    return Fault(world, lambda: faults.remove(fault), lasts_s)
 
 
 def clock_set(world: World, target: str, by_s: float) -> Fault:
