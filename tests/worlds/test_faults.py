@@ -16,7 +16,7 @@ from tests.worlds.faults.lines import cable, gateway, power
 from tests.worlds.faults.replies import lost, silent
 from tests.worlds.plan import Event, draw
 from tests.worlds.rates import Kind, kinds
-from tests.worlds.world import World, built
+from tests.worlds.world import BOOT_S, World, built
 
 # Parts that a World has or has not.
 PARTS = {
@@ -56,7 +56,7 @@ def test_every_kind_begins_and_ends(world: World, kind: Kind) -> None:
     world.run(0.3)
     mend(world)
     if kind.name != "zero":
-        world.run(1.0)
+        world.run(BOOT_S if kind.name in ("restart", "reboot") else 1.0)
         assert not fault.present
     for other in present(world):
         other.end()
