@@ -243,6 +243,7 @@ docs: gallery
 nightly: lint wheel deb demo test pages walks long service hidden bench
 	$(MAKE) faults OPTIONS=--fresh
 	$(BIN)/python -m tests.worlds --fresh-for 600 --fresh-fails --jobs 2
+	$(BIN)/python -m tests.worlds.defects --seeds 1
 	for hour in 1 2 3; do $(BIN)/python -m tests.soak --minutes 60 --together 0.6 --seed $$(date +%j)$$hour || exit 1; done
 	$(BIN)/python -m tests.soak --without-faults --hours 24
 	COMPD_FUZZ=20 $(PYTEST) --timeout 1800 tests/fuzz

@@ -97,7 +97,7 @@ def _search(name: str, seed: int, how: Search, tree: Patched | None) -> Found:
     with Played(start("tests.worlds.defects.play", *how.arguments(seed))) as world:
         refused: dict[str, float] = {}
         for mark in world.marks():
-            if mark.time_s - refused.get(mark.what, -LASTS_S) < LASTS_S or not (tree or _beside(defect, mark)):
+            if mark.time_s - refused.get(mark.what, -LASTS_S) < LASTS_S or not _may_be(defect, mark):
                 continue
             shown = shows(plan, mark, lambda part, what: _fails(start, part, what), without(defect, tree is not None))
             if shown is not None:
@@ -144,6 +144,6 @@ def _fails(start: Callable[..., subprocess.Popen[str]], plan: Plan, what: str) -
     return at_s
 
 
-def _beside(defect: Defect, mark: Mark) -> bool:
-    """Whether this may be a defect that is in the tree."""
-    return mark.what == defect.invariant and bool(set(defect.beside) & set(mark.blame.split(", ")))
+def _may_be(defect: Defect, mark: Mark) -> bool:
+    """Whether the mark is of an invariant that finds the defect, beside one of its kinds of fault."""
+    return mark.what in defect.invariants and bool(set(defect.beside) & set(mark.blame.split(", ")))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 
 import numpy as np
@@ -11,7 +11,7 @@ from compd.errors import CompdError
 from compd.simulation.truth.motion import Drives, SetpointMotion, standing
 from tests.worlds.faults.away import OLD, away
 from tests.worlds.faults.fault import Fault
-from tests.worlds.faults.layers import disturb, unplug
+from tests.worlds.faults.layers import Remove, disturb, unplug
 from tests.worlds.faults.wiring import lines_of_scales, names_on, wired
 from tests.worlds.wires import lost
 from tests.worlds.world import World
@@ -19,6 +19,8 @@ from tests.worlds.world import World
 # From the loss of the scales to the push, s.
 _PUSHED_AFTER_S = 0.1
 _FASTEST_MM_PER_S = 1e3
+# How often somebody looks whether the machine stands, and how long it then rests, s.
+_LOOKS_EVERY_S, _RESTS_S = 0.05, 0.3
 
 
 def driven(world: World, target: str, to_mm: Sequence[float], mm_per_s: float, mm_per_s2: float) -> Fault:
@@ -48,13 +50,26 @@ def moved_while_silent(
     after_s: float,
     lasts_s: float,
 ) -> Fault:
-    """The line `target` answers nothing for `lasts_s` (s); the links drive by `by_mm` (n) `after_s` (s) later."""
+    """The machine stops, and the line `target` answers nothing for `lasts_s` (s).
+
+    The links begin to drive by `by_mm` (n) `after_s` (s) after its last answer.
+    """
+    hub = world.hub
+    undo: list[Remove] = []
+    fault = Fault(world, lambda: [one() for one in undo], targets=names_on(world, target))
+
+    def begin() -> None:
+        if fault.present:
+            undo.append(disturb(world.wires[target], lost))
+            hub.at(hub.now_s + after_s, depart)
+            hub.at(hub.now_s + lasts_s, fault.end)
 
     def depart() -> None:
         _drive(world, world.scale_mm() + by_mm, Drives(mm_per_s, mm_per_s2))
 
-    world.hub.at(world.hub.now_s + after_s, depart)
-    return Fault(world, disturb(world.wires[target], lost), lasts_s, targets=names_on(world, target))
+    rests(world, target)
+    _when_it_stands(world, begin)
+    return fault
 
 
 def pushed(world: World, target: str, by_mm: Sequence[float], away_s: float, keeps: bool, stays_s: float) -> Fault:
@@ -74,6 +89,20 @@ def collides(world: World, target: str) -> Fault:
     truth = world.truth
     truth._motion = SetpointMotion(standing(world.scale_mm()), truth._drives)
     return Fault(world, lasts_s=0.0)
+
+
+def _when_it_stands(world: World, then: Callable[[], object]) -> None:
+    """Call a function when the machine has stood for a moment."""
+    hub = world.hub
+
+    def look() -> None:
+        world.scale_mm()  # moves the truth to the present
+        if world.moving:
+            hub.at(hub.now_s + _LOOKS_EVERY_S, look)
+        else:
+            hub.at(hub.now_s + _RESTS_S, then)
+
+    look()
 
 
 def _fast(world: World) -> Drives:
