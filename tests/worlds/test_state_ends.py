@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 import pytest
@@ -64,7 +65,7 @@ def test_a_gauge_that_is_back_is_believed_in_time(name: str, kind: str) -> None:
         line = line_of(world, gauge)
         for silent_s in (0.1, 1.2):
             cause = cause_of_silence(world.configuration, gauge, silent_s)
-            ends_in_time(world, cause, gauge, silent_s, lambda s=silent_s: silent(world, line, s))
+            ends_in_time(world, cause, gauge, silent_s, partial(silent, world, line, silent_s))
         ends_in_time(world, Cause.LINE, gauge, 1.3, lambda: cable(world, line, 1.3))
 
 
@@ -73,7 +74,7 @@ def test_the_daemon_is_back_in_time(name: str) -> None:
     with built(CONFIG / name, 2) as world:
         stand_somewhere(world)
         for pause_s in (0.3, 2.0):
-            ends_in_time(world, Cause.PAUSED, "", pause_s, lambda s=pause_s: world.pause(s))
+            ends_in_time(world, Cause.PAUSED, "", pause_s, partial(world.pause, pause_s))
 
         ends_in_time(world, Cause.ACQUISITION, "", 0.0, world.kill_acquisition)
         world.stop()
