@@ -10,11 +10,14 @@ import numpy as np
 import pytest
 from scipy.stats import binom
 
+from compd.configuration import load
 from compd.setpoint_states import State
+from tests.support.paths import CONFIG
 from tests.worlds.coverage import NO_FAULT, Case, Coverage, upper_limit
 from tests.worlds.invariants import mostly_valid, nothing_lost, steady_correction, true_reason, within_bound
 from tests.worlds.plan import Event
-from tests.worlds.recovery import Allowed, Recovery
+from tests.worlds.rates import kinds
+from tests.worlds.recovery import CAUSES, Allowed, Recovery, allowed
 from tests.worlds.sight import Happening, Sight
 from tests.worlds.world import Told
 
@@ -35,9 +38,11 @@ def sight(now: Any, state: State = State.OK, error_um: float = 0.0, u_tip_um: fl
     return Sight(CONFIGURATION, now, told, **given)  # type: ignore[arg-type]
 
 
-def happening(kind: str, ended_s: float = math.inf, is_fault: bool = True) -> Any:
+def happening(
+    kind: str, ended_s: float = math.inf, is_fault: bool = True, targets: tuple[str, ...] | None = None
+) -> Any:
     family, _, name = kind.partition(".")
-    fault = SimpleNamespace(ended_s=ended_s, present=ended_s == math.inf)
+    fault = SimpleNamespace(began_s=0.0, ended_s=ended_s, present=ended_s == math.inf, targets=targets)
     return Happening(Event(0.0, family, name, "", {}), fault, is_fault)  # type: ignore[arg-type]
 
 
@@ -125,7 +130,11 @@ def test_without_a_fault_nearly_all_is_valid() -> None:
     assert not mostly_valid(coverage, without_faults=False)
 
 
-TIMES = {"default": Allowed(1.0, True), "lines.cable": Allowed(3.0, True), "replies.lost": Allowed(1.0, False)}
+TIMES = {"gauges.jump": Allowed(1.0, True), "lines.cable": Allowed(3.0, True), "replies.lost": Allowed(1.0, False)}
+
+
+def times(configuration: Any, awaited: Any, moved: bool) -> Allowed:
+    return TIMES[awaited[-1].event.name]
 
 
 @pytest.mark.parametrize(
@@ -140,7 +149,7 @@ TIMES = {"default": Allowed(1.0, True), "lines.cable": Allowed(3.0, True), "repl
 )
 def test_setpoints_are_valid_again_in_time(kind: str, accepted_s: float | None, state: State, late_s: float) -> None:
     def course(valid_from_s: float) -> list[str]:
-        recovery = Recovery(TIMES)
+        recovery = Recovery(times)
         recovery.begins(happening(kind, ended_s=10.0))
         if accepted_s is not None:
             recovery.accepted(accepted_s)
@@ -153,6 +162,40 @@ def test_setpoints_are_valid_again_in_time(kind: str, accepted_s: float | None, 
 
 
 def test_nothing_is_late_while_a_fault_is_present() -> None:
-    recovery = Recovery(TIMES)
+    recovery = Recovery(times)
     recovery.begins(happening("lines.cable"))
     assert not recovery.late(sight(setpoint(1e6), State.STOP))
+
+
+@pytest.mark.parametrize(
+    ("kind", "lasts_s", "targets", "at_rest", "in_motion"),
+    [
+        ("computer.pause_in_motion", 0.4, (), False, False),
+        ("computer.pause", 2.0, (), False, False),
+        ("replies.silent", 0.1, ("scale_1",), False, False),
+        ("machine.moved_while_silent", 1.5, ("scale_1",), False, True),
+        ("lines.cable", 1.0, ("scale_1",), False, True),
+        ("lines.gateway", 1.0, None, True, True),
+        ("machine.pushed", 1.0, None, True, True),
+        ("gauges.step", 1.0, ("scale_1",), True, True),
+    ],
+)
+def test_a_person_may_be_asked_for_where_the_reference_says_so(
+    kind: str, lasts_s: float, targets: tuple[str, ...] | None, at_rest: bool, in_motion: bool
+) -> None:
+    configuration = load(CONFIG / "tripod-cmm.yaml")
+    awaited = [happening(kind, lasts_s, targets=targets)]
+    times = [allowed(configuration, awaited, moved) for moved in (False, True)]
+    assert [row.person for row in times] == [at_rest, in_motion]
+    assert all(0.0 < row.within_s < 15.0 for row in times)
+
+
+def test_faults_that_follow_each_other_are_as_long_as_all_of_them() -> None:
+    configuration = load(CONFIG / "tripod-cmm.yaml")
+    one = happening("replies.silent", 0.1, targets=("scale_1",))
+    assert not allowed(configuration, [one], True).person
+    assert allowed(configuration, [one, happening("replies.silent", 1.5, targets=("scale_1",))], True).person
+
+
+def test_every_kind_with_a_cause_is_a_kind_of_fault() -> None:
+    assert set(CAUSES) <= {f"{kind.family}.{kind.name}" for kind in kinds() if kind.fault}

@@ -73,7 +73,7 @@ class Watch:
         self._recent.append(happening)
         self._recovery.begins(happening)
         if happening.is_fault:
-            self._suspects.update(happening.fault.targets or ("",))
+            self._suspects.update(happening.fault.suspects)
         if happening.is_fault and happening.fault.targets:
             onset = self.blindness.begins(happening.fault.began_s, *happening.fault.targets)
             self._onsets.append((happening, onset))
@@ -87,7 +87,7 @@ class Watch:
         self._suspects = set()
         for happening in self._recent:
             if happening.is_fault and happening.concerns(now_s):
-                self._suspects.update(happening.fault.targets or ("",))
+                self._suspects.update(happening.fault.suspects)
 
     @property
     def asks_for_s(self) -> float:

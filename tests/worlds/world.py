@@ -52,6 +52,8 @@ SUPERVISOR, ACQUISITION, LOOP, SERVICE = "supervisor", "acquisition", "loop", "s
 NEXT_LOOP = "next loop"
 # `RestartSec` of systemd/compd.service, s.
 RESTART_S = 0.1
+# Of a unit that a person restarts, s: until it starts.
+STOPPED_S = 2.0
 # Of a computer that boots, s: until the daemon starts.
 BOOT_S = 5.0
 # Until every gauge has been read often enough after a start.
@@ -188,7 +190,7 @@ class World:
     def restart(self) -> None:
         """A person restarts the unit."""
         self.end()
-        self.hub.at(self.hub.now_s + 2.0, self.start)
+        self.hub.at(self.hub.now_s + STOPPED_S, self.start)
 
     def reload(self, change: Callable[[dict[str, Any]], None] = lambda document: None) -> None:
         """A person changes the configuration and reloads it."""
