@@ -28,6 +28,7 @@ from compd.configuration import Configuration, load
 from compd.documents import read_document
 from compd.live.daemon import Daemon
 from compd.live.loop import Loop, Setpoint
+from compd.live.loop.cycle_state import CycleSettings
 from compd.live.machine import MachineZero
 from compd.live.run_daemon import run_daemon
 from compd.plugins import SIMULATED_GAUGES
@@ -58,6 +59,8 @@ ZERO_WITHIN_S = 6.0
 # Setpoints per second of the program that watches.
 WATCHED_HZ = 20.0
 _LOG_ENTRIES = 1000
+# Of each channel: true values that its device sensed last.
+_SENSED = 512
 
 
 class Told(NamedTuple):
@@ -79,7 +82,8 @@ class World:
     ----------
     wires : by name of the line. shown : by gauge, changes what its device senses: (channel, true value) -> value.
     told : every setpoint since the last `forget`. hearers : called with each setpoint and with what is true of it.
-    clients, controller : of the daemon. log : the last entries of its log. died : tracebacks in the daemon.
+    clients, controller : of the daemon. cycle : settings of its newest loop. log : the last entries of its log.
+    died : tracebacks in the daemon.
     """
 
     def __init__(self, hub: Hub, configuration: Configuration, truth: Truth, directory: Path) -> None:
@@ -87,6 +91,7 @@ class World:
         self.configuration = configuration
         self.truth = truth
         self.shown: dict[str, Callable[[str, float], float]] = {}
+        self._sensed: dict[str, deque[tuple[float, float]]] = {}
         self.told: list[Told] = []
         self.hearers: list[Callable[[Setpoint, Told], None]] = []
         self.log: deque[Mapping[str, Any]] = deque(maxlen=_LOG_ENTRIES)
@@ -96,6 +101,7 @@ class World:
         self.wires: dict[str, Wire] = {}
         self.clients = Clients(self.system, Path(configuration.sockets.unix.path))
         self.daemon: Daemon | None = None
+        self.cycle: CycleSettings | None = None
         self.controller = Controller(self.system, configuration, lambda scale_mm: self.drive(scale_mm.tolist()))
         self._on = False
         self._to_close: list[Daemon] = []
@@ -121,8 +127,15 @@ class World:
 
     def _sense(self, gauge: str, sense: Callable[[str], float], channel: str) -> float:
         value = sense(channel)
+        name = f"{gauge}.{channel}"
+        self._sensed.setdefault(name, deque(maxlen=_SENSED)).append((self.hub.now_s, value))
         shown = self.shown.get(gauge)
         return value if shown is None else shown(channel, value)
+
+    def sensed_at(self, channel: str, time_s: float) -> float:
+        """What a device would have shown without a fault at the sample nearest to this time (s); nan before any."""
+        sensed = self._sensed.get(channel, ())
+        return min(sensed, key=lambda sample: abs(sample[0] - time_s), default=(math.nan, math.nan))[1]
 
     # --- the daemon ------------------------------------------------------------------------------------
 
@@ -285,11 +298,16 @@ class World:
                 return True
         return False
 
+    def tip_error_mm(self, setpoint: Setpoint) -> np.ndarray:
+        """(3,) of a valid setpoint of now."""
+        with self._live.now() as truth:
+            return tip_mm(setpoint, truth.tip_frame) - _true_tip_mm(setpoint, truth)
+
     def _note(self, setpoint: Setpoint) -> None:
         error_um = math.nan
         with self._live.now() as truth:
             if setpoint.values is not None:
-                error_um = 1e3 * math.dist(_tip_mm(setpoint, truth.tip_frame), _true_tip_mm(setpoint, truth))
+                error_um = 1e3 * math.dist(tip_mm(setpoint, truth.tip_frame), _true_tip_mm(setpoint, truth))
             moving = truth.phase == "moving"
         u_tip_um = math.nan if setpoint.u_tip_um is None else setpoint.u_tip_um
         told = Told(setpoint.time_s, setpoint.valid, setpoint.state, setpoint.reason, u_tip_um, error_um, moving)
@@ -307,7 +325,8 @@ def _true_tip_mm(setpoint: Setpoint, truth: Truth) -> np.ndarray:
     return state.tip_M if truth.tip_frame == "M" else state.tip_P
 
 
-def _tip_mm(setpoint: Setpoint, frame: str) -> np.ndarray:
+def tip_mm(setpoint: Setpoint, frame: str) -> np.ndarray:
+    """(3,) of a valid setpoint, in the frame "M" or "P"."""
     values = setpoint.values
     assert values is not None
     return np.asarray(values.tip_M_mm if frame == "M" else values.tip_P_mm)
@@ -379,6 +398,7 @@ def _observed(world: World) -> Iterator[None]:
     class ObservedLoop(Loop):
         def __init__(self, cycle: Any, latest: Any, commands: Any, sinks: Any, *arguments: Any) -> None:
             super().__init__(cycle, latest, commands, [*sinks, world._note], *arguments)
+            world.cycle = cycle
 
     with (
         patch("compd.live.run_daemon.Daemon", ObservedDaemon),
