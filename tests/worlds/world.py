@@ -134,8 +134,14 @@ class World:
 
     def sensed_at(self, channel: str, time_s: float) -> float:
         """What a device would have shown without a fault at the sample nearest to this time (s); nan before any."""
-        sensed = self._sensed.get(channel, ())
-        return min(sensed, key=lambda sample: abs(sample[0] - time_s), default=(math.nan, math.nan))[1]
+        after_s, value = math.inf, math.nan
+        for sampled_s, sampled in reversed(self._sensed.get(channel, ())):  # nearly always among the newest
+            if time_s - sampled_s >= after_s - time_s:
+                break
+            after_s, value = sampled_s, sampled
+            if sampled_s <= time_s:
+                break
+        return value
 
     # --- the daemon ------------------------------------------------------------------------------------
 
