@@ -27,16 +27,12 @@ Invariant = Callable[[Sight], str]
 
 
 def within_bound(sight: Sight) -> str:
-    """No valid setpoint is beyond three times its bound, unless no data can show why."""
+    """No valid setpoint is beyond three times its bound, without what no data can show (`tests.worlds.unknowable`)."""
     told, bound_um = sight.told, sight.bound_um
-    if not told.valid or not told.error_um > MOST * bound_um or excused(sight):
+    if not told.valid or not sight.left_um > MOST * bound_um:
         return ""
-    return f"{told.error_um:.4g} um of a bound of {bound_um:.4g} um while {told.state}"
-
-
-def excused(sight: Sight) -> bool:
-    """Whether no data can show what is wrong: a fault of docs/reference/blind-spots.md, found by a program."""
-    return sight.left_unseen
+    part = "" if sight.left_um == told.error_um else f", {sight.left_um:.4g} um of it could be known,"
+    return f"{told.error_um:.4g} um{part} of a bound of {bound_um:.4g} um while {told.state}"
 
 
 def steady_correction(sight: Sight) -> str:

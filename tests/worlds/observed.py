@@ -32,6 +32,7 @@ def observed(world: World) -> Iterator[None]:
     class ObservedLoop(Loop):
         def __init__(self, cycle: Any, latest: Any, commands: Any, sinks: Any, *arguments: Any) -> None:
             super().__init__(cycle, latest, commands, [*sinks, world.note], *arguments)
+            world.cycle = cycle
 
     with (
         patch("compd.live.run_daemon.Daemon", ObservedDaemon),

@@ -34,7 +34,7 @@ def setpoint(time_s: float, correction_mm: float = 0.0, **more: Any) -> Any:
 
 def sight(now: Any, state: State = State.OK, error_um: float = 0.0, u_tip_um: float = 1.0, **more: Any) -> Sight:
     told = Told(now.time_s, state.valid, state, more.pop("reason", ""), u_tip_um, error_um, more.pop("moving", False))
-    given = {"before": None, "recent": (), "suspects": frozenset(), "left_unseen": False} | more
+    given = {"before": None, "recent": (), "suspects": frozenset(), "left_um": error_um} | more
     return Sight(CONFIGURATION, now, told, **given)  # type: ignore[arg-type]
 
 
@@ -65,8 +65,18 @@ def test_a_setpoint_is_within_three_times_its_bound(
     assert within_bound(sight(now, State.REFUSED, error_um=error_um, u_tip_um=u_tip_um)) == ""
 
 
-def test_a_departure_that_no_reading_shows_is_left_out() -> None:
-    assert within_bound(sight(setpoint(1.0), error_um=50.0, left_unseen=True)) == ""
+def test_what_no_data_can_show_is_left_out_of_the_error() -> None:
+    assert within_bound(sight(setpoint(1.0), error_um=50.0, left_um=2.9)) == ""
+    assert "50 um, 3.1 um of it could be known" in within_bound(sight(setpoint(1.0), error_um=50.0, left_um=3.1))
+
+
+def test_a_departure_has_its_own_case_with_all_of_its_error() -> None:
+    departed = sight(setpoint(1.0), error_um=50.0, left_um=0.5, moving=True, departed=True)
+    assert departed.cases == {Case("departure", NO_FAULT)}
+    assert departed.counted_um == 50.0
+    fault = sight(setpoint(1.0), error_um=50.0, left_um=0.5, recent=(happening("lines.cable"),))
+    assert fault.cases == {Case("after", "lines")}
+    assert fault.counted_um == 0.5
 
 
 @pytest.mark.parametrize(("by_mm", "holds"), [(0.0025, True), (0.0026, False), (-0.0026, False)])

@@ -10,14 +10,16 @@ from dataclasses import dataclass, field
 from compd.live.loop import Setpoint
 from compd.setpoint_states import State
 from tests.worlds import invariants
-from tests.worlds.blindness import Blindness, Onset, left_out
+from tests.worlds.blindness import Blindness, Onset
 from tests.worlds.coverage import Coverage
-from tests.worlds.departure import Departure
 from tests.worlds.promises import Promises
 from tests.worlds.recovery import Recovery
 from tests.worlds.sight import Happening, Sight
+from tests.worlds.unknowable import Judge
 from tests.worlds.world import Told, World
 
+# From a person's `accept` until every process of the daemon has taken it in, s.
+ACCEPTED_WITHIN_S = 0.5
 # Between two comparisons of the gauges with each other, s.
 LOOK_EVERY_S = 0.1
 
@@ -59,9 +61,10 @@ class Watch:
         self._recovery = Recovery()
         self._recent: list[Happening] = []
         self._suspects: set[str] = set()
+        self._accepted: tuple[float, set[str]] = -math.inf, set()
         self._onsets: list[tuple[Happening, Onset]] = []
         self._before: Setpoint | None = None
-        self._departure = Departure(self.world)
+        self._judge = Judge(self.world, self.blindness.due_s)
         self.promises = Promises(self.world)
         self._faulty_since_s: float | None = None
         self._without_zero_since_s: float | None = None
@@ -84,6 +87,7 @@ class Watch:
         self._recovery.accepted(now_s)
         self.blindness.accept()
         self._faulty_since_s = None
+        self._accepted = now_s, self._suspects
         self._suspects = set()
         for happening in self._recent:
             if happening.is_fault and happening.concerns(now_s):
@@ -111,10 +115,12 @@ class Watch:
             told,
             self._before,
             tuple(self._recent),
-            frozenset(self._suspects),
-            self._departure.unseen(setpoint, told) or self._hides_at(setpoint.time_s),
+            self._suspects_at(now_s),
+            told.error_um,
         )
-        self.coverage.count(sight.cases, told.valid, told.error_um, sight.bound_um)
+        left_um, departed = self._judge.judge(setpoint, told, self._hidden(setpoint.time_s), sight.bound_um)
+        sight = sight._replace(left_um=left_um, departed=departed)
+        self.coverage.count(sight.cases, told.valid, sight.counted_um, sight.bound_um)
         for name, invariant in invariants.OF_SETPOINTS.items():
             if text := invariant(sight):
                 self.note(name, sight.blame, text)
@@ -135,13 +141,18 @@ class Watch:
         if self.hear_also is not None:
             self.hear_also(sight)
 
-    def _hides_at(self, time_s: float) -> bool:
-        """Whether a fault that no reading shows yet has an effect at this time, s."""
+    def _suspects_at(self, now_s: float) -> frozenset[str]:
+        """Gauges that had a fault since a person has looked, as far as the daemon can know of that."""
+        accepted_s, before = self._accepted
+        return frozenset(self._suspects | before if now_s < accepted_s + ACCEPTED_WITHIN_S else self._suspects)
+
+    def _hidden(self, time_s: float) -> set[str]:
+        """Channels of faults that no reading shows yet, and that have an effect at this time, s."""
         for happening, onset in self._onsets:
             if not happening.fault.present and onset.ended_s == math.inf:
                 self.blindness.ends(onset, happening.fault.ended_s)
         self._onsets = [one for one in self._onsets if time_s < min(one[1].seen_s, one[1].ended_s)]
-        return left_out([onset for _, onset in self._onsets], time_s)
+        return {channel for _, onset in self._onsets if onset.hides_at(time_s) for channel in onset.channels}
 
     def note(self, what: str, blame: str, text: str) -> None:
         """Something does not hold now."""

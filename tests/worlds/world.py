@@ -27,6 +27,7 @@ from compd.documents import read_document
 from compd.errors import CompdError
 from compd.live.daemon import Daemon
 from compd.live.loop import Setpoint
+from compd.live.loop.cycle_state import CycleSettings
 from compd.live.machine import MachineZero
 from compd.live.run_daemon import run_daemon
 from compd.plugins import SIMULATED_GAUGES
@@ -62,6 +63,8 @@ ZERO_WITHIN_S = 6.0
 # Setpoints per second of the program that watches.
 WATCHED_HZ = 20.0
 _LOG_ENTRIES = 1000
+# Of each channel: true values that its device sensed last.
+_SENSED = 512
 
 
 class Told(NamedTuple):
@@ -83,7 +86,8 @@ class World:
     ----------
     wires : by name of the line. shown : by gauge, changes what its device senses: (channel, true value) -> value.
     told : every setpoint since the last `forget`. hearers : called with each setpoint and with what is true of it.
-    clients, controller : of the daemon. log : the last entries of its log. died : tracebacks in the daemon.
+    clients, controller : of the daemon. cycle : settings of its newest loop. log : the last entries of its log.
+    died : tracebacks in the daemon.
     """
 
     def __init__(self, hub: Hub, configuration: Configuration, truth: Truth, directory: Path) -> None:
@@ -91,6 +95,7 @@ class World:
         self.configuration = configuration
         self.truth = truth
         self.shown: dict[str, Callable[[str, float], float]] = {}
+        self._sensed: dict[str, deque[tuple[float, float]]] = {}
         self.told: list[Told] = []
         self.hearers: list[Callable[[Setpoint, Told], None]] = []
         self.beginners: list[Callable[[], object]] = []
@@ -101,6 +106,7 @@ class World:
         self.wires: dict[str, Wire] = {}
         self.clients = Clients(self.system, Path(configuration.sockets.unix.path))
         self.daemon: Daemon | None = None
+        self.cycle: CycleSettings | None = None
         self.controller = Controller(self.system, configuration, lambda scale_mm: self.drive(scale_mm.tolist()))
         self._on = False
         self._to_close: list[Daemon] = []
@@ -126,8 +132,21 @@ class World:
 
     def _sense(self, gauge: str, sense: Callable[[str], float], channel: str) -> float:
         value = sense(channel)
+        name = f"{gauge}.{channel}"
+        self._sensed.setdefault(name, deque(maxlen=_SENSED)).append((self.hub.now_s, value))
         shown = self.shown.get(gauge)
         return value if shown is None else shown(channel, value)
+
+    def sensed_at(self, channel: str, time_s: float) -> float:
+        """What a device would have shown without a fault at the sample nearest to this time (s); nan before any."""
+        after_s, value = math.inf, math.nan
+        for sampled_s, sampled in reversed(self._sensed.get(channel, ())):  # nearly always among the newest
+            if time_s - sampled_s >= after_s - time_s:
+                break
+            after_s, value = sampled_s, sampled
+            if sampled_s <= time_s:
+                break
+        return value
 
     # --- the daemon ------------------------------------------------------------------------------------
 
@@ -298,6 +317,11 @@ class World:
             if self.told and self.told[-1].state is State.OK:
                 return True
         return False
+
+    def tip_error_mm(self, setpoint: Setpoint) -> np.ndarray:
+        """(3,) of a valid setpoint of now."""
+        with self._live.now() as truth:
+            return tip_mm(setpoint, truth.tip_frame) - true_tip_mm(setpoint, truth)
 
     def note(self, setpoint: Setpoint) -> None:
         """A loop has made a setpoint."""
