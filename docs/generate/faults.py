@@ -45,7 +45,7 @@ drives. Its owner has added to the configuration:
 
 {fence(yaml.safe_dump({"votes": VOTES}), "yaml")}
 The columns on the right are from
-`{document["command"]}`:
+`{document["command"]}`; those of clients with `--real`:
 
 - *largest error* of any setpoint that was valid, from the beginning of the fault until the state was `ok` again.
   Without any fault it is 0.3 um, the noise of the gauges;

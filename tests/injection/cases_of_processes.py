@@ -25,7 +25,7 @@ PROCESSES_AND_CLIENTS: tuple[Case, ...] = (
             Way.ITSELF,
             watched_s=1.0,
             lost=process in ("service", "supervisor"),
-            real=process != "supervisor",
+            real=signal == KILL and process in ("loop", "service"),
         )
         for process, signal in (
             ("loop", KILL),

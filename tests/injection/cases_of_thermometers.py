@@ -12,10 +12,19 @@ from tests.injection.signal_faults import Noisy
 THERMOMETER = "Thermometers"
 
 
-def _thermometer(id: str, fault: str, injected: str, begin: Begin, watched_s: float = 2.0) -> Case:
+def _thermometer(id: str, fault: str, injected: str, begin: Begin, watched_s: float = 2.0, unseen: str = "") -> Case:
     """What is wrong of it is held against the bound that the setpoint itself states."""
     return Case(
-        id, THERMOMETER, fault, injected, begin, Way.EITHER, bound_um=math.inf, watched_s=watched_s, expands=True
+        id,
+        THERMOMETER,
+        fault,
+        injected,
+        begin,
+        Way.EITHER,
+        bound_um=math.inf,
+        watched_s=watched_s,
+        unseen=unseen,
+        expands=True,
     )
 
 
@@ -54,6 +63,7 @@ THERMOMETERS: tuple[Case, ...] = (
         "link_1 + 1 K every second",
         drifting("cabinet", "link_1", 1.0),
         watched_s=4.0,
+        unseen="wrong_thermometer",
     ),
     _thermometer(
         "thermometers-unplugged",

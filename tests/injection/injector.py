@@ -198,7 +198,6 @@ class Injector:
     def __init__(self, configuration: Mapping[str, Any], directory: Path) -> None:
         """configuration : the daemon's, with the ports of the simulated machine. directory : for ports, existing."""
         self.configuration = configuration
-        self.lines = tuple(configuration["lines"])
         self._directory = directory
         context = multiprocessing.get_context("spawn")
         self._orders, theirs = context.Pipe()
@@ -214,14 +213,6 @@ class Injector:
             self._orders.send(["stop"])
         self._process.join(ANSWER_WITHIN_S)
         self._orders.close()
-
-    @property
-    def pid(self) -> int:
-        assert self._process.pid is not None
-        return self._process.pid
-
-    def protocol(self, line: str) -> Protocol:
-        return protocol_of(line, self.configuration)
 
     def daemon_configuration(self) -> dict[str, Any]:
         """The configuration with the injector's ports in place of the machine's."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol
@@ -12,9 +12,10 @@ from compd.setpoint_states import State
 from tests.injection.faults import Fault
 from tests.support.watching import Seen
 
-# The configuration of the machine, and the rate of its daemon.
+# The configuration of the machine, the rate of its daemon, and the seed of its noise.
 TRIPOD = "tripod-cmm.yaml"
 RATE_HZ = 100.0
+SEED = 3
 VALID_FOR_S = 0.1
 # What an owner adds to the shipped configuration, so that the gauges are compared with each other.
 VOTES = {
@@ -172,13 +173,11 @@ class Machine(ABC):
         return False
 
 
-def prepare(configuration: dict[str, Any], changes: Mapping[str, Mapping[str, Any]]) -> None:
-    """Change a configuration document as the matrix needs it, and as `changes` say by section."""
+def prepare(configuration: dict[str, Any]) -> None:
+    """Change a configuration document as the matrix needs it."""
     configuration["loop"]["rate_hz"] = RATE_HZ
     configuration.setdefault("sockets", {})["valid_for_s"] = VALID_FOR_S
     add_votes(configuration)
-    for section, values in changes.items():
-        configuration.setdefault(section, {}).update(values)
 
 
 def add_votes(configuration: dict[str, Any]) -> None:

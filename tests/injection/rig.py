@@ -7,7 +7,7 @@ import math
 import os
 import signal
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any, Self
@@ -20,6 +20,7 @@ from tests.injection.clients import Attacked, attacking
 from tests.injection.ends import LOOPBACK
 from tests.injection.injector import Injector
 from tests.injection.machine import (
+    SEED,
     SETTLED_S,
     TRIPOD,
     UNKNOWN,
@@ -36,16 +37,11 @@ from tests.support.watching import Seen, Watcher, until
 
 
 class RealMachine(Machine):
-    """The shipped tripod, simulated, with the injector on every line and a daemon beyond it. A context manager.
+    """The shipped tripod, simulated, with the injector on every line and a daemon beyond it. A context manager."""
 
-    changes : of the daemon's configuration, by section: {"loop": {"on_stale": "fade"}}.
-    """
-
-    def __init__(self, directory: Path, seed: int = 3, changes: Mapping[str, Mapping[str, Any]] | None = None) -> None:
+    def __init__(self, directory: Path) -> None:
         self.directory = directory
         self.state = directory / "state"
-        self._seed = seed
-        self._changes = changes or {}
         self._reloaded = False
         self._running = ExitStack()
 
@@ -60,7 +56,7 @@ class RealMachine(Machine):
 
     def _start(self, running: ExitStack) -> None:
         wires, ports = self.directory / "wires", self.directory / "ports"
-        options = ["--directory", str(wires), "--seed", str(self._seed), "--zero-hold", "1e9"]
+        options = ["--directory", str(wires), "--seed", str(SEED), "--zero-hold", "1e9"]
         commands = [Command(["sim", "run", str(CONFIG / TRIPOD), *options], ready=wires / "control.sock")]
         ports.mkdir()
         with _preferred():
@@ -85,7 +81,7 @@ class RealMachine(Machine):
         host, port = self._tcp
         data["sockets"] = {"tcp": {"host": host, "port": port}, "unix": {"path": str(self.directory / "s")}}
         data["state"] = {"directory": str(self.state)}
-        prepare(data, self._changes)
+        prepare(data)
         path = self.directory / "machine.yaml"
         path.write_text(yaml.safe_dump(data, sort_keys=False))
         return path

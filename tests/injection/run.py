@@ -20,11 +20,16 @@ from compd.cli.progress import count_shown
 from tests.injection.cells.cell import all_cells
 from tests.injection.cells.report import report
 from tests.injection.cells.trial import try_cell
-from tests.injection.matrix import MATRIX
+from tests.injection.machine import Machine
+from tests.injection.matrix import MATRIX, REAL
 from tests.injection.measured import write
+from tests.injection.rig import RealMachine
 from tests.injection.trial import settle, try_case
 from tests.injection.virtual import VirtualMachine
+from tests.support.simulated import run_directory
 
+# Trials of one process: what worlds map into its memory ends with it.
+TASKS_PER_PROCESS = 20
 # What `--sample` takes: one in eleven, so that all four situations and a machine without a fault are among them.
 SAMPLE = slice(2, None, 11)
 
@@ -40,8 +45,11 @@ class Tried(NamedTuple):
 def main(arguments: Sequence[str] | None = None) -> int:
     """Print the tables; 1 where a trial is not as it must be."""
     options = _options(arguments)
-    names = [name for name in all_names() if not options.trial or any(fnmatch(name, one) for one in options.trial)]
-    tried = _try(sample(names) if options.sample else names, options.jobs)
+    names = sample(all_names()) if options.sample else all_names()
+    if options.real:
+        names = [case.id for case in (MATRIX if options.trial else REAL)]
+    names = [name for name in names if not options.trial or any(fnmatch(name, one) for one in options.trial)]
+    tried = _try_real(names) if options.real else _try(names, options.jobs)
     found = [(one.name, one.result) for one in tried if one.result is not None]
     outcomes = [result for name, result in found if "@" not in name]
     cells = [result for name, result in found if "@" in name]
@@ -70,6 +78,7 @@ def _options(arguments: Sequence[str] | None) -> argparse.Namespace:
     add = parser.add_argument
     add("trial", nargs="*", help='these alone, or patterns: "scale-*@motion"')
     add("--sample", action="store_true", help="a part of them with something of every kind")
+    add("--real", action="store_true", help="with real ptys, sockets and processes: the sample, or cases by name")
     add("--jobs", type=int, default=os.cpu_count(), help="worlds side by side")
     add("--write", type=Path, help="the file of the documentation: docs/faults.json")
     return parser.parse_args(arguments)
@@ -79,11 +88,20 @@ def _try(names: Sequence[str], jobs: int) -> list[Tried]:
     """Try them side by side; in their order."""
     context = multiprocessing.get_context("spawn")
     tried = []
-    with ProcessPoolExecutor(jobs, context) as pool, count_shown(len(names), "trials") as shown:
+    with (
+        ProcessPoolExecutor(jobs, context, max_tasks_per_child=TASKS_PER_PROCESS) as pool,
+        count_shown(len(names), "trials") as shown,
+    ):
         for number, one in enumerate(pool.map(try_named, names), start=1):
             tried.append(one)
             shown(number)
     return tried
+
+
+def _try_real(names: Sequence[str]) -> list[Tried]:
+    """Try cases one after the other on a machine with real parts."""
+    with run_directory() as directory, RealMachine(directory) as machine:
+        return [Tried(name, _outcome(machine, name)) for name in names]
 
 
 def try_named(name: str) -> Tried:
@@ -97,9 +115,11 @@ def try_named(name: str) -> Tried:
 def _result(name: str) -> dict[str, Any]:
     if "@" in name:
         return try_cell(next(cell for cell in all_cells() if cell.name == name)).as_data()
-    case = next(case for case in MATRIX if case.id == name)
-    with VirtualMachine(expands=case.expands) as machine:
-        settle(machine)
-        outcome = try_case(machine, case)
-        outcome.problems += machine.world.died
-    return outcome.as_data()
+    with VirtualMachine() as machine:
+        outcome = _outcome(machine, name)
+        return outcome | {"problems": [*outcome["problems"], *machine.world.died]}
+
+
+def _outcome(machine: Machine, name: str) -> dict[str, Any]:
+    settle(machine)
+    return try_case(machine, next(case for case in MATRIX if case.id == name)).as_data()

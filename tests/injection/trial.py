@@ -27,6 +27,8 @@ KNOWN_WITHIN_S = 1.2
 WATCHED_AFTER_S = 1.5
 # A reason is for people, and goes out with every setpoint.
 MAX_REASON = 1100  # bytes
+# Cases in which targets are sent.
+CONTROLLERS = ("client-targets", "client-target_bursts")
 # A busy computer makes polls late: so many setpoints may be disturbed where nothing must be.
 DISTURBED_SHARE = 0.2
 
@@ -163,6 +165,9 @@ def _judge(machine: Machine, case: Case, outcome: Outcome, seen: Sequence[Seen],
     outcome.valid_share = sum(bool(s["valid"]) for s in during) / len(during) if during else math.nan
     outcome.expired = sum(s["valid"] and s.arrived_s > s["valid_until"] for s in seen)
     problems = outcome.problems
+    problems += verdict.old_targets
+    if case.id in CONTROLLERS and math.isnan(verdict.target_late_s):
+        problems.append("no setpoint answers a target: the controller has done nothing")
     if verdict.worst_at_rest_um > case.bound_um:
         problems.append(
             f"a valid setpoint is wrong by {verdict.worst_at_rest_um:.1f} um, allowed {case.bound_um:g}: "

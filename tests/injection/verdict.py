@@ -53,6 +53,13 @@ class Verdict:
     reasons: list[str] = field(default_factory=list)
 
     @property
+    def old_targets(self) -> list[str]:
+        """What is wrong where too many setpoints answer an old target."""
+        if self.late <= BEYOND_SHARE * self.setpoints:
+            return []
+        return [f"{self.late} of {self.setpoints} setpoints answer an old target, up to {self.target_late_s:.2f} s"]
+
+    @property
     def problems(self) -> list[str]:
         """What must not be, but for a fault that nothing shows."""
         problems = []
@@ -66,10 +73,7 @@ class Verdict:
             problems.append(
                 f"{self.unbounded} of {self.held} valid setpoints have no bound; worst {self.worst_um:.1f} um"
             )
-        if self.late > BEYOND_SHARE * self.setpoints:
-            oldest = f"{self.target_late_s:.2f} s"
-            problems.append(f"{self.late} of {self.setpoints} setpoints answer an old target, up to {oldest}")
-        return problems
+        return problems + self.old_targets
 
 
 def judge(machine: Machine, seen: Sequence[Seen]) -> Verdict:

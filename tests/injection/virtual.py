@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from itertools import cycle
 from pathlib import Path
@@ -20,6 +20,7 @@ from compd.simulation.truth.strengths import FULLY_MEASURED, Strengths, seen_by
 from tests.injection.faults import Exchange, Fault
 from tests.injection.line_faults import FaultOfLine, sent_through
 from tests.injection.machine import (
+    SEED,
     SETTLED_S,
     TRIPOD,
     UNKNOWN,
@@ -36,7 +37,6 @@ from tests.worlds.connection import Connection
 from tests.worlds.faults.computer import keep_busy
 from tests.worlds.world import SUPERVISOR, Told, World, built
 
-SEED = 3
 # Steel.
 EXPANSION, EXPANSION_PPM_PER_K = "link_expansion", 11.5
 # How long the daemon has to end, and a person's request to be answered, s.
@@ -55,27 +55,19 @@ _DECIMALS_S = 6
 class VirtualMachine(Machine):
     """A world, the faults of its lines, and what is true of each of its setpoints. A context manager.
 
-    changes : of the daemon's configuration, by section. expands : its links expand as steel does, and the daemon
-    corrects it by its thermometers.
+    expands : its links expand as steel does, and the daemon corrects it by its thermometers.
     """
 
-    def __init__(
-        self, seed: int = SEED, changes: Mapping[str, Mapping[str, Any]] | None = None, expands: bool = False
-    ) -> None:
+    def __init__(self, seed: int = SEED, expands: bool = False) -> None:
         self.expands = expands
         self.world: World
         self._seed = seed
-        self._changes = changes or {}
         self._running = ExitStack()
         self._held: dict[float, Held] = {}
         self._moved_s = -math.inf
         self._reloaded = False
 
     def __enter__(self) -> Self:
-        if self.expands:
-            model = Path(self._running.enter_context(TemporaryDirectory())) / "expands.yaml"
-            file_with(model, EXPANSION, **{EXPANSION: EXPANSION_PPM_PER_K})
-            self._changes = {**self._changes, "state": {"model_file": str(model)}}
         self.world = self._running.enter_context(
             built(
                 CONFIG / TRIPOD,
@@ -96,7 +88,11 @@ class VirtualMachine(Machine):
         self._running.close()
 
     def _change(self, document: dict[str, Any]) -> None:
-        prepare(document, self._changes)
+        prepare(document)
+        if self.expands:
+            model = Path(self._running.enter_context(TemporaryDirectory())) / "expands.yaml"
+            file_with(model, EXPANSION, **{EXPANSION: EXPANSION_PPM_PER_K})
+            document["state"]["model_file"] = str(model)
 
     def _expansion(self, configuration: Configuration) -> list[Cause]:
         sizer = CauseSizer(configuration.geometry, configuration.wiring, self._seed)

@@ -17,7 +17,6 @@ from contextlib import contextmanager, suppress
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Any
-from weakref import WeakSet
 
 from compd.files import Content
 from compd.live.system import ForkedProcess, Privileges, System
@@ -74,7 +73,7 @@ class VirtualSelector(selectors.EpollSelector):
     def __init__(self, hub: Hub) -> None:
         super().__init__()
         self._hub = hub
-        self._closed = False
+        self.closed = False
         hub.watch(self.fileno())
 
     def select(self, timeout: float | None = None) -> list[tuple[selectors.SelectorKey, int]]:
@@ -86,15 +85,19 @@ class VirtualSelector(selectors.EpollSelector):
         return ready
 
     def cut_connections(self) -> None:
-        """End the connections that it waits for, as the kernel does for a process that has gone; listeners stay."""
-        for key in () if self._closed else list(self.get_map().values()):
-            end = key.fileobj
+        """Close the connections that it waits for, as the kernel does for a process that has gone; listeners stay."""
+        ends = [] if self.closed else [key.fileobj for key in self.get_map().values()]
+        self.close()
+        for end in ends:
             if isinstance(end, socket.socket) and not end.getsockopt(socket.SOL_SOCKET, socket.SO_ACCEPTCONN):
                 with suppress(OSError), end:
                     end.shutdown(socket.SHUT_RDWR)
+                end.close()
 
     def close(self) -> None:
-        self._closed = True
+        if self.closed:
+            return
+        self.closed = True
         self._hub.forget(self.fileno())
         super().close()
 
@@ -139,7 +142,7 @@ class VirtualProcess(ForkedProcess):
         self.descriptor = os.eventfd(0, os.EFD_NONBLOCK | os.EFD_CLOEXEC)
         self._system = system
         self._actors: list[Actor] = []
-        self.selectors: WeakSet[VirtualSelector] = WeakSet()
+        self.selectors: list[VirtualSelector] = []
         self._exit_code: int | None = None
         self.spawn(lambda: self._end(self._main(run)))
 
@@ -237,7 +240,8 @@ class VirtualSystem(System):
 
     def selector(self) -> selectors.BaseSelector:
         selector = VirtualSelector(self.hub)
-        self.process_of(this_actor()).selectors.add(selector)
+        process = self.process_of(this_actor())
+        process.selectors = [*(one for one in process.selectors if not one.closed), selector]
         return selector
 
     # --- threads and processes -------------------------------------------------------------------------
