@@ -20,7 +20,8 @@ from compd.stated_noise import tolerance_mm
 from compd.units import UM_PER_MM
 from tests.worlds.departure import Departure
 from tests.worlds.faults.wiring import wired
-from tests.worlds.world import Told, World, tip_mm
+from tests.worlds.tips import tip_mm
+from tests.worlds.world import Told, World
 
 # A correction follows a wrong comparator at the speed that the limits allow, and a counted one at any.
 _ANY_MM_PER_S = 1e9
