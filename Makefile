@@ -242,6 +242,7 @@ docs: gallery
 # Hours of faults, and other examples of every fuzzer than yesterday's.
 nightly: lint wheel deb demo test pages walks long service hidden bench faults
 	$(ONE_THREAD) $(BIN)/python -m tests.worlds --fresh-for 3600 --fresh-fails --jobs 2
+	$(BIN)/python -m tests.worlds.defects --seeds 1
 	$(BIN)/python -m tests.soak --hours 24
 	COMPD_FUZZ=20 $(PYTEST) --timeout 1800 tests/fuzz
 	$(MAKE) scoreboard

@@ -229,6 +229,11 @@ class Blindness:
         not."""
         return min((channel.since_s for channel in self._of(gauge)), default=math.inf)
 
+    def due_s(self, name: str) -> float:
+        """From a reading of a channel to the time from which the next one is overdue, s; inf before two of them."""
+        usual_s = self._channels[name].usual_s
+        return math.inf if math.isnan(usual_s) else ROUNDS_UNTIL_DUE * usual_s
+
     # --- evidence --------------------------------------------------------------------------------------
 
     def _of(self, gauge: str) -> list[_Channel]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Iterator
 from contextlib import suppress
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -36,27 +37,45 @@ class Clients:
     Attributes
     ----------
     answers : to the persons' requests, in the order in which they came.
+    asks : called with the number of each request, the request and its file. replies : called with number and answer.
     """
 
     def __init__(self, system: VirtualSystem, path: Path) -> None:
         self.answers: list[Answer] = []
+        self.asks: list[Callable[[int, dict[str, Any], Path | None], object]] = []
+        self.replies: list[Callable[[int, dict[str, Any] | None], object]] = []
         self._system = system
         self._path = path
-        self._numbers = 0
+        self._numbers = self._requests = 0
 
     def ask(self, message: dict[str, Any], file: Path | None = None) -> None:
         """Send a request; the answer comes into `answers`. `file`: whose descriptor goes along."""
-        expected = (message["class"], "ERROR")
+        self._start(partial(self._asked, message, file))
+
+    def apply_shadow(self) -> None:
+        """Ask which model runs as the shadow, and let it be applied."""
 
         def converse() -> None:
-            reply = None
-            with suppress(OSError), Connection(self._system, self._path) as connection:
-                connection.send(message, file)
-                answers = connection.messages(self._system.monotonic() + PATIENCE_S)
-                reply = next((one for one in answers if one["class"] in expected), None)
-            self.answers.append(Answer(self._system.monotonic(), message["class"], reply))
+            models = self._asked({"class": "MODEL"}) or {}
+            if hash_ := models.get("shadow", {}).get("model"):
+                self._asked({"class": "MODEL", "hash": hash_})
 
         self._start(converse)
+
+    def _asked(self, message: dict[str, Any], file: Path | None = None) -> dict[str, Any] | None:
+        """Send a request, and wait for its answer."""
+        self._requests += 1
+        number, reply = self._requests, None
+        for hear_request in self.asks:
+            hear_request(number, message, file)
+        with suppress(OSError), Connection(self._system, self._path) as connection:
+            connection.send(message, file)
+            answers = connection.messages(self._system.monotonic() + PATIENCE_S)
+            reply = next((one for one in answers if one["class"] in (message["class"], "ERROR")), None)
+        self.answers.append(Answer(self._system.monotonic(), message["class"], reply))
+        for hear_reply in self.replies:
+            hear_reply(number, reply)
+        return reply
 
     def watch(self, rate_hz: float) -> None:
         """A program that wants setpoints, and comes again when the daemon has gone."""
@@ -77,7 +96,7 @@ class Clients:
         self._start(recording.run)
         return recording
 
-    def _start(self, run: Callable[[], None]) -> None:
+    def _start(self, run: Callable[[], object]) -> None:
         self._numbers += 1
         self._system.start(run, f"client {self._numbers}")
 

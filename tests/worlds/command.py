@@ -78,12 +78,12 @@ class Total:
         """Coverage, validity and width of the bound."""
         coverage = self.coverage
         head = ("setpoints", 10), ("valid", 7), ("beyond", 8), ("at most", 8), ("stretches", 9)
-        rows = [f"{'state':7} {'family':11} " + " ".join(f"{name:>{width}}" for name, width in head)]
+        rows = [f"{'state':9} {'family':11} " + " ".join(f"{name:>{width}}" for name, width in head)]
         for case, share in coverage.shares():
             valid = coverage.valid[case] / coverage.all[case]
             beyond = share.beyond / share.setpoints if share.setpoints else float("nan")
             rows.append(
-                f"{case.state:7} {case.family:11} {coverage.all[case]:10} {valid:7.2%} {beyond:8.3%} "
+                f"{case.state:9} {case.family:11} {coverage.all[case]:10} {valid:7.2%} {beyond:8.3%} "
                 f"{share.upper:8.3%} {share.stretches:9}"
             )
         rows.append(f"bound: median {coverage.width_um(0.5):.3g} um, 95 % below {coverage.width_um(0.95):.4g} um")

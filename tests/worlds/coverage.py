@@ -16,7 +16,11 @@ NO_FAULT = "none"
 
 
 class Case(NamedTuple):
-    """What a setpoint is counted under. state : "rest", "motion" or "after" (a fault is present, or ended 5 s ago)."""
+    """What a setpoint is counted under.
+
+    state : "rest", "motion", "after" (a fault is present, or ended 5 s ago) or "departure" (the machine has left, and
+    no reading shows it yet).
+    """
 
     state: str
     family: str

@@ -1,60 +1,80 @@
-"""Blind spot of a departure: the machine has left its place, and no reading since then shows it."""
+"""Motion that no reading shows yet: a machine that has left its place, or whose links change their speed impossibly.
+
+Of each scale by itself: its newest reading was sampled before, and the next one is not overdue. One that is overdue
+counts as standing while other scales answer, and none of them shows a departure either. By docs/explanation/
+limits-and-stale-gauges.md `u_tip_um` leaves a departure out after a long rest, and no other.
+"""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 
 from compd.arrays import FloatArray
-from compd.live.loop import Setpoint
-from tests.worlds.faults.wiring import wired
-from tests.worlds.world import Told, World
 
-# A change of a reading shows motion from so many times its noise on.
-SIGMAS = 5.0
-# A reading that is so much younger than a departure shows it, s.
-SHOWS_AFTER_S = 0.02
-_MM_PER_UM = 1e-3
+# A rest is long that has lasted so many times as long as a reading is old.
+RESTED = 19.0
 
 
 class Departure:
-    """Follows a world's scales from its last rest; called with every setpoint."""
+    """Follows the true motion of a world's scales; called with every setpoint.
 
-    def __init__(self, world: World) -> None:
-        configuration = world.configuration
-        names = [
-            f"{gauge}.{channel.name}"
-            for gauge, driver in configuration.gauge_objects().items()
-            for channel in driver.channels
-        ]
-        scales = [channel for channel in wired(configuration) if channel.kind == "scale"]
-        noise_um = [configuration.gauges[channel.gauge].noise_um or math.inf for channel in scales]
-        self._world = world
-        self._at = [names.index(channel.name) for channel in scales]
-        self._shows_mm = SIGMAS * _MM_PER_UM * np.array(noise_um)
-        self._left_s = math.inf
-        self._rest_mm = self._true_mm = np.full(len(scales), math.nan)
+    shows_mm (n,) : a change that a reading shows. acceleration (n,) : what is stated, mm/s2; inf where nothing is.
+    """
 
-    def unseen(self, setpoint: Setpoint, told: Told) -> bool:
-        """Whether the machine has left, and no reading of a scale since then shows it.
+    def __init__(self, shows_mm: FloatArray, acceleration: FloatArray) -> None:
+        self._shows_mm, self._acceleration = shows_mm, acceleration
+        count = len(shows_mm)
+        self._now_s = self._left_s = math.inf
+        self._since_s = math.inf  # of the rest
+        self._still_s = math.inf  # of the newest standstill
+        self._rest_mm = self._before_mm = np.full(count, math.nan)
+        self._speeds = np.full(count, math.nan)
+        self._broke_s = np.full(count, -math.inf)
 
-        A scale that moves and was read later than `SHOWS_AFTER_S` after the departure shows it, whatever it says.
+    def unseen(
+        self,
+        now_s: float,
+        moving: bool,
+        true_mm: FloatArray,
+        speeds: FloatArray,
+        read_s: FloatArray,
+        sampled_mm: Callable[[], FloatArray],
+        due_s: FloatArray,
+    ) -> np.ndarray:
+        """Whether a scale (n,) has moved since its newest reading in a way that nobody can know of yet.
+
+        true_mm, speeds : (n,) now, mm/s. read_s : (n,) of the newest readings. sampled_mm : (n,) truth when they were
+        sampled. due_s : (n,) from a reading to the time from which the next one is overdue.
         """
-        if setpoint.inputs is None or not self._at:
-            return False
-        slots = setpoint.inputs.snapshot.readings.slots[self._at]
-        read_mm, read_s = slots["value"], slots["time_s"]
-        true_mm = self._world.scale_mm()
-        if told.moving and self._left_s == math.inf:
-            self._left_s = told.time_s - getattr(self._world.truth._motion, "_since_s", 0.0)
-        moved = np.abs(true_mm - self._true_mm) > self._shows_mm
-        seen = (np.abs(read_mm - self._rest_mm) > self._shows_mm) | (moved & (read_s > self._left_s + SHOWS_AFTER_S))
-        if seen.any() or not (told.moving or moved.any()):
-            if not told.moving:
-                self._rests(read_mm, true_mm)
-            return False
-        return self._left_s < math.inf
+        self._follow_speeds(now_s, speeds)
+        self._follow_rest(now_s, moving, true_mm)
+        age_s = now_s - read_s
+        awaited = age_s <= due_s
+        unseen = awaited & (read_s < self._broke_s)
+        if self._left_s < math.inf:
+            rested = self._left_s - self._since_s >= RESTED * age_s
+            sampled = sampled_mm()
+            at_rest = np.abs(sampled - self._rest_mm) <= self._shows_mm
+            stands = awaited | (awaited.any() & at_rest.all())
+            unseen |= stands & rested & at_rest
+            if not moving and (np.abs(sampled - true_mm) <= self._shows_mm).all():
+                self._left_s, self._since_s, self._rest_mm = math.inf, self._still_s, true_mm.copy()
+        return unseen
 
-    def _rests(self, read_mm: FloatArray, true_mm: FloatArray) -> None:
-        self._left_s, self._rest_mm, self._true_mm = math.inf, read_mm.copy(), true_mm
+    def _follow_speeds(self, now_s: float, speeds: FloatArray) -> None:
+        """Note where the speed has changed by more than is stated."""
+        possible = self._acceleration * (now_s - self._now_s) + 1e-6 if self._now_s < math.inf else math.inf
+        self._broke_s = np.where(np.abs(speeds - self._speeds) > possible, now_s, self._broke_s)
+        self._speeds = speeds
+
+    def _follow_rest(self, now_s: float, moving: bool, true_mm: FloatArray) -> None:
+        if moving or not (np.abs(true_mm - self._before_mm) <= self._shows_mm).all():
+            self._still_s = now_s
+        if self._now_s == math.inf:
+            self._since_s, self._rest_mm = now_s if moving else -math.inf, true_mm.copy()  # a world begins at rest
+        elif self._left_s == math.inf and (moving or not (np.abs(true_mm - self._rest_mm) <= self._shows_mm).all()):
+            self._left_s = self._now_s
+        self._now_s, self._before_mm = now_s, true_mm.copy()

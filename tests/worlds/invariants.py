@@ -1,13 +1,13 @@
 """What must hold in every world: each a function that says what does not hold, and "" where it holds.
 
 Of each setpoint: `within_bound`, `steady_correction`, `true_reason`. Of a world between two of its events:
-`nothing_lost`; of a whole world: `mostly_valid`. `tests.worlds.recovery` has the times after faults, and
-`tests.worlds.run` sees tracebacks.
+`nothing_lost`; of its models: `adopted_model`; of a whole world: `mostly_valid`. `tests.worlds.recovery` has the times
+after faults, and `tests.worlds.run` sees tracebacks.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Set
 
 import numpy as np
 
@@ -27,16 +27,12 @@ Invariant = Callable[[Sight], str]
 
 
 def within_bound(sight: Sight) -> str:
-    """No valid setpoint is beyond three times its bound, unless no data can show why."""
+    """No valid setpoint is beyond three times its bound, without what no data can show (`tests.worlds.unknowable`)."""
     told, bound_um = sight.told, sight.bound_um
-    if not told.valid or not told.error_um > MOST * bound_um or excused(sight):
+    if not told.valid or not sight.left_um > MOST * bound_um:
         return ""
-    return f"{told.error_um:.4g} um of a bound of {bound_um:.4g} um while {told.state}"
-
-
-def excused(sight: Sight) -> bool:
-    """Whether no data can show what is wrong: a fault of docs/reference/blind-spots.md, found by a program."""
-    return sight.left_unseen
+    part = "" if sight.left_um == told.error_um else f", {sight.left_um:.4g} um of it could be known,"
+    return f"{told.error_um:.4g} um{part} of a bound of {bound_um:.4g} um while {told.state}"
 
 
 def steady_correction(sight: Sight) -> str:
@@ -83,6 +79,16 @@ def nothing_lost(taken: Mapping[str, float], used: Mapping[str, float]) -> str:
         return ""
     channels = sorted(name for name in {*taken, *used} if taken.get(name) != used.get(name))
     return f"machine zero of {len(channels)} channels is not the one that was taken last: {', '.join(channels[:5])}"
+
+
+def adopted_model(allowed: Set[str], used: str) -> str:
+    """The model that was adopted is the one that runs, also after the loop or its service was killed.
+
+    allowed : hashes of what was promised last and of what was asked for since. used : hash that a setpoint names.
+    """
+    if used in allowed:
+        return ""
+    return f"runs with the model {used or 'none'}; promised was {' or '.join(sorted(one or 'none' for one in allowed))}"
 
 
 def mostly_valid(coverage: Coverage, without_faults: bool) -> str:

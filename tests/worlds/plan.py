@@ -16,9 +16,11 @@ from tests.worlds.faults.wiring import Wired, wired
 from tests.worlds.machines import DRAWN, machine_file
 from tests.worlds.rates import Kind
 
-# Accelerations of the drives, mm/s2: of a measuring machine to those of a fast handling machine.
-ACCELERATIONS_MM_PER_S2 = (100.0, 3500.0)
+# Acceleration of the drives of a plan without a drive, mm/s2: that of a measuring machine.
+MM_PER_S2 = 250.0
 _DIGITS = 6
+# Parameter of a drive.
+_ACCELERATION = "mm_per_s2"
 
 
 class Event(NamedTuple):
@@ -38,7 +40,7 @@ class Event(NamedTuple):
 class Plan(NamedTuple):
     """What a world plays.
 
-    machine : as `machine_file` takes it. seed : of the world. mm_per_s2 : acceleration of the drives.
+    machine : as `machine_file` takes it. seed : of the world. mm_per_s2 : largest acceleration of the drives.
     """
 
     machine: str
@@ -70,7 +72,6 @@ def draw(seed: int, duration_s: float, kinds: Sequence[Kind], machine: str | Non
     rng = random.Random(f"plan {seed}")
     drawn = rng.choice(DRAWN)
     machine = machine or drawn
-    mm_per_s2 = _log(rng, *ACCELERATIONS_MM_PER_S2)
     with tempfile.TemporaryDirectory() as directory:
         configuration = load(machine_file(machine, Path(directory)))
     targets = _targets(configuration)
@@ -82,6 +83,7 @@ def draw(seed: int, duration_s: float, kinds: Sequence[Kind], machine: str | Non
         if targets[kind.target]
         for time_s in _times_s(kind.per_hour, duration_s, chance)
     ]
+    mm_per_s2 = max((event.parameters.get(_ACCELERATION, 0.0) for event in events), default=0.0) or MM_PER_S2
     return Plan(machine, seed, duration_s, mm_per_s2, tuple(sorted(events, key=lambda event: event.time_s)))
 
 

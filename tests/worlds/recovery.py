@@ -1,41 +1,92 @@
-"""Setpoints are valid again within a time after the last fault; where a person is asked for, after a person came."""
+"""Setpoints are valid again within a time after the last fault; where a person is asked for, after a person came.
+
+The times are those of docs/reference/states.md.
+"""
 
 from __future__ import annotations
 
-from pathlib import Path
+import math
+from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
-import yaml
-
+from compd.configuration import Configuration
 from compd.setpoint_states import State
+from docs.generate.state_ends import PERSON, Cause, cause_of_silence, within_s
 from tests.worlds.sight import Happening, Sight
 
-FILE = Path(__file__).with_name("back_within.yaml")
+# What the states come from after a fault of a kind; `Cause.WRONG` after all others.
+CAUSES: Mapping[str, Sequence[Cause]] = {
+    "replies.lost": [Cause.SILENT],
+    "replies.silent": [Cause.SILENT],
+    "lines.cable": [Cause.LINE],
+    "lines.cables_of_scales": [Cause.LINE],
+    "lines.gateway": [Cause.LINE],
+    "lines.power": [Cause.SILENT, Cause.WRONG],
+    "gauges.returns": [Cause.LINE, Cause.WRONG],
+    "gauges.thermometer_jump": [Cause.QUANTITY],
+    "computer.pause": [Cause.PAUSED],
+    "computer.pause_in_motion": [Cause.PAUSED],
+    # a process that sleeps for too long is killed
+    "computer.pause_process": [Cause.PAUSED, Cause.ACQUISITION],
+    "computer.wakes_late": [Cause.PAUSED],
+    "computer.killed": [Cause.ACQUISITION],
+    "computer.restart": [Cause.STARTED],
+    "computer.reboot": [Cause.STARTED],
+    "computer.torn_file": [Cause.STARTED, Cause.WRONG],
+    "computer.clock_set": [Cause.LIMIT],
+    "machine.moved_while_silent": [Cause.SILENT],
+    "machine.pushed": [Cause.LINE, Cause.WRONG],
+}
 
 
 class Allowed(NamedTuple):
-    """within_s : from the end of a fault to a valid setpoint. person : whether a person may be asked for."""
+    """within_s : from the end of the last fault to a valid setpoint. person : whether a person may be asked for."""
 
     within_s: float
     person: bool
 
 
-def allowed_times(path: Path = FILE) -> dict[str, Allowed]:
-    """By kind, as "lines.cable"; "default" for all others."""
-    return {name: Allowed(**row) for name, row in yaml.safe_load(path.read_text(encoding="utf-8")).items()}
+def allowed(configuration: Configuration, awaited: Sequence[Happening], moved: bool) -> Allowed:
+    """What the reference allows after faults that follow each other.
+
+    moved : whether the machine has moved since the first began.
+    """
+    lasted_s = max(one.fault.ended_s for one in awaited) - min(one.fault.began_s for one in awaited)
+    longest_s, person = 0.0, False
+    for one in awaited:
+        gauges = [name for name in one.fault.targets or () if name in configuration.gauges]
+        for cause in _causes(configuration, one, gauges, lasted_s):
+            rests_s, moves_s = (within_s(configuration, cause, moving, gauges, lasted_s) for moving in (False, True))
+            person = person or (moves_s if moved else rests_s) == PERSON
+            # after a person came, gauges are read as after a start
+            longest_s = max(longest_s, rests_s if math.isfinite(rests_s) else within_s(configuration, Cause.STARTED))
+    return Allowed(longest_s, person)
+
+
+def _causes(configuration: Configuration, one: Happening, gauges: Sequence[str], lasted_s: float) -> set[Cause]:
+    causes = set(CAUSES.get(one.event.name, [Cause.WRONG]))
+    if Cause.SILENT in causes:
+        causes -= {Cause.SILENT}
+        causes |= {cause_of_silence(configuration, gauge, lasted_s) for gauge in gauges}
+    scales = {wire.gauge.partition(".")[0] for wire in configuration.wiring.scale}
+    if causes & {Cause.SILENT, Cause.LINE} and scales <= {*(gauges or configuration.gauges)}:
+        causes |= {Cause.ALL_SCALES}
+    return causes
 
 
 class Recovery:
     """Follows one world from its last fault to its next valid setpoint."""
 
-    def __init__(self, times: dict[str, Allowed] | None = None) -> None:
-        self._times = times or allowed_times()
+    def __init__(self, allowed: Callable[[Configuration, Sequence[Happening], bool], Allowed] = allowed) -> None:
+        self._allowed = allowed
         self._awaited: list[Happening] = []
         self._accepted_s: float | None = None
+        self._moved = False
 
     def begins(self, happening: Happening) -> None:
         """A fault begins."""
         if happening.is_fault:
+            self._moved = self._moved and bool(self._awaited)
             self._awaited.append(happening)
             self._accepted_s = None
 
@@ -46,20 +97,20 @@ class Recovery:
 
     def late(self, sight: Sight) -> str:
         """What does not hold: no setpoint was valid for too long after the last fault has ended."""
+        self._moved = self._moved or sight.told.moving
         if not self._awaited or any(happening.fault.present for happening in self._awaited):
             return ""
         if sight.told.valid:
             self._awaited.clear()
             return ""
-        rows = [self._times.get(one.event.name, self._times["default"]) for one in self._awaited]
+        within_s, person = self._allowed(sight.configuration, self._awaited, self._moved)
         ended_s = max(happening.fault.ended_s for happening in self._awaited)
-        if any(row.person for row in rows):
-            if self._accepted_s is None and sight.told.state is State.FAULT:
+        if person:
+            if sight.told.state is State.NO_ZERO or (self._accepted_s is None and sight.told.state is State.FAULT):
                 return ""  # the person is on the way
             ended_s = max(ended_s, self._accepted_s or 0.0)
-        within_s = max(row.within_s for row in rows)
         if sight.told.time_s <= ended_s + within_s:
             return ""
         kinds = ", ".join(sorted({happening.event.name for happening in self._awaited}))
         self._awaited.clear()
-        return f"not valid within {within_s:g} s after {kinds}: {sight.told.state}, {sight.told.reason[:200]}"
+        return f"not valid within {within_s:.3g} s after {kinds}: {sight.told.state}, {sight.told.reason[:200]}"

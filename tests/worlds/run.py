@@ -16,7 +16,8 @@ from tests.worlds.clients import Recording
 from tests.worlds.coverage import NO_FAULT, Coverage
 from tests.worlds.faults import begin
 from tests.worlds.faults.fault import Fault, mend, present
-from tests.worlds.invariants import mostly_valid, nothing_lost
+from tests.worlds.faults.persons import zero
+from tests.worlds.invariants import mostly_valid
 from tests.worlds.machines import fast, machine_file, measured_errors
 from tests.worlds.plan import Event, Plan
 from tests.worlds.rates import kinds
@@ -32,6 +33,8 @@ ACCEPTS_AFTER_S = 0.5
 RECORDED_WITHIN_S = 1.0
 # Speed of the drives before the first event, mm/s.
 _MM_PER_S = 50.0
+# Work during which the daemon stops and starts anew.
+_STOPS = {"persons.reload"}
 _WORK = {f"{kind.family}.{kind.name}" for kind in kinds() if not kind.fault}
 
 
@@ -89,8 +92,7 @@ class _Play:
         self._skipped: Counter[str] = Counter()
         self._asked = 0
         self._began_s = world.hub.now_s
-        self._zero = dict(world.zero.readings_mm)
-        self._taking: list[Fault] = []
+        self._taking: Fault | None = None
 
     def run(self, until: Callable[[Watch], bool], record_to: Path | None = None) -> Report:
         plan, watch, world = self._plan, self._watch, self._world
@@ -104,7 +106,7 @@ class _Play:
         if recording is not None:
             recording.end()
             world.run(RECORDED_WITHIN_S)
-        without_faults = all(event.name in _WORK for event in plan.events)
+        without_faults = all(event.name in _WORK - _STOPS for event in plan.events)
         if text := mostly_valid(watch.coverage, without_faults):
             watch.note("mostly_valid", NO_FAULT, text)
         return Report(
@@ -125,22 +127,17 @@ class _Play:
             world.forget()
             if world.died:
                 watch.note("no_traceback", self._blame(), world.died[-1])
-            self._look_at_zero()
+            if text := watch.promises.zero_lost():
+                watch.note("nothing_lost", self._blame(), text)
             if watch.asks_for_s >= ACTS_AFTER_S:
                 self._asked += 1
                 mend(world)
                 world.run(ACCEPTS_AFTER_S)
                 world.accept()
                 watch.accepted()
-
-    def _look_at_zero(self) -> None:
-        """Compare the machine zero that is used with the one that was taken last."""
-        used = dict(self._world.zero.readings_mm)
-        if self._taking:
-            self._taking = [fault for fault in self._taking if fault.present]
-        elif text := nothing_lost(self._zero, used):
-            self._watch.note("nothing_lost", self._blame(), text)
-        self._zero = used
+            if watch.lacks_zero_for_s >= ACTS_AFTER_S and (self._taking is None or not self._taking.present):
+                self._asked += 1
+                self._taking = zero(world, "")
 
     def _begin(self, event: Event) -> None:
         try:
@@ -150,8 +147,6 @@ class _Play:
                 raise
             self._skipped[event.name] += 1
             return
-        if event.name == "persons.zero":
-            self._taking.append(fault)
         self._watch.begins(Happening(event, fault, event.name not in _WORK))
 
     def _blame(self) -> str:

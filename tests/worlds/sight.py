@@ -33,7 +33,8 @@ class Sight(NamedTuple):
 
     before : last valid setpoint before it. recent : what is present or ended less than `AFTER_S` ago, oldest first.
     suspects : gauges that had a fault since a person last looked; "" where it could be any.
-    left_unseen : whether no reading shows yet what is wrong: the machine has left its place, or a fault hides.
+    left_um : the error without the part that no data can show. departed : whether the machine moves and no reading
+    shows it yet.
     """
 
     configuration: Configuration
@@ -42,7 +43,8 @@ class Sight(NamedTuple):
     before: Setpoint | None
     recent: tuple[Happening, ...]
     suspects: frozenset[str]
-    left_unseen: bool
+    left_um: float
+    departed: bool = False
 
     @property
     def bound_um(self) -> float:
@@ -57,9 +59,14 @@ class Sight(NamedTuple):
     @property
     def cases(self) -> set[Case]:
         """What the setpoint is counted under: its state, with each family of fault."""
-        state = "motion" if self.told.moving else "rest"
+        state = "departure" if self.departed else "after" if self.faults else "motion" if self.told.moving else "rest"
         families = {happening.event.family for happening in self.faults}
-        return {Case("after", family) for family in families} or {Case(state, NO_FAULT)}
+        return {Case(state, family) for family in families or {NO_FAULT}}
+
+    @property
+    def counted_um(self) -> float:
+        """The error for the coverage: of a departure, which has its own case, all of it."""
+        return self.told.error_um if self.departed else self.left_um
 
     @property
     def blame(self) -> str:

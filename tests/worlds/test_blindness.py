@@ -17,7 +17,11 @@ from compd.live.acquisition import LOOK_EVERY_S
 from compd.simulation.truth.motion import Drives, SetpointMotion, standing
 from tests.support.paths import CONFIG
 from tests.worlds.blindness import Blindness, Onset, Stated, left_out, listening, stated_channels
-from tests.worlds.faults import keep_busy, line_of, lose_replies, scales, shift, unplug
+from tests.worlds.faults.computer import keep_busy
+from tests.worlds.faults.gauges import shift
+from tests.worlds.faults.lines import cable
+from tests.worlds.faults.replies import lost
+from tests.worlds.faults.wiring import line_of, scales
 from tests.worlds.possible_readings import PossibleMotion
 from tests.worlds.redundancy import Relation, following
 from tests.worlds.world import World, built
@@ -324,10 +328,10 @@ def test_in_a_world_each_fault_is_visible_or_left_out() -> None:
         large = watch.begins(world.hub.now_s, two)
         shift(world, two, 0.5)
         world.run(0.5)
-        lose_replies(world, line_of(world, three), 3)
+        lost(world, line_of(world, three), 3)
         brief = watch.begins(world.hub.now_s + 0.01, three)
         world.run(0.5)
-        unplug(world, line_of(world, three), 0.2)
+        cable(world, line_of(world, three), 0.2)
         world.run(0.05)
         gone = watch.begins(world.hub.now_s, three)
         world.run(0.5)

@@ -6,17 +6,20 @@ import math
 import random
 from collections.abc import Iterator
 
+import numpy as np
 import pytest
 
 from tests.support.paths import CONFIG
 from tests.worlds.faults import begin
-from tests.worlds.faults.fault import mend, present
+from tests.worlds.faults.computer import pause
+from tests.worlds.faults.fault import Fault, mend, present
 from tests.worlds.faults.gauges import jump
 from tests.worlds.faults.lines import cable, gateway, power
+from tests.worlds.faults.machine import driven, moved_while_silent
 from tests.worlds.faults.replies import lost, silent
 from tests.worlds.plan import Event, draw
 from tests.worlds.rates import Kind, kinds
-from tests.worlds.world import World, built
+from tests.worlds.world import BOOT_S, World, built
 
 # Parts that a World has or has not.
 PARTS = {
@@ -56,7 +59,7 @@ def test_every_kind_begins_and_ends(world: World, kind: Kind) -> None:
     world.run(0.3)
     mend(world)
     if kind.name != "zero":
-        world.run(1.0)
+        world.run(BOOT_S if kind.name in ("restart", "reboot") else 1.0)
         assert not fault.present
     for other in present(world):
         other.end()
@@ -107,3 +110,43 @@ def test_displays_without_power_count_from_zero_until_a_person_looks(world: Worl
     assert fault.present
     mend(world)
     assert world.shown["scale_2"]("position", 2.0) == 2.0
+
+
+def test_a_machine_departs_from_rest_while_a_scale_is_silent(world: World) -> None:
+    wire, place_mm = world.wires["scale_1"], world.scale_mm()
+    world.drive((place_mm + 20.0).tolist())
+    world.run(0.1)
+    fault = moved_while_silent(world, "scale_1", [2.0, 2.0, 2.0], 100.0, 1000.0, 0.05, 0.5)
+    while world.moving:
+        world.run(0.01)
+    place_mm, answers = world.scale_mm(), wire.fault(b"1")
+    assert answers
+    assert np.all(place_mm > 0.1)
+    world.run(0.3)
+    assert not wire.fault(b"1")
+    world.run(0.3)
+    assert world.scale_mm() == pytest.approx(place_mm + 2.0)
+    world.run(0.4)
+    assert not fault.present
+    assert wire.fault(b"1")
+
+
+def test_links_that_move_stop_within_their_stroke_whatever_their_next_drive_is(world: World) -> None:
+    home_mm = [0.0, 0.0, 0.0]
+    driven(world, "", home_mm, 500.0, 3000.0)
+    world.arrive()
+    driven(world, "", [20.0, 20.0, 20.0], 500.0, 3000.0)
+    world.run(0.1)
+    driven(world, "", home_mm, 10.0, 100.0)
+    largest_mm = 0.0
+    while world.moving:
+        largest_mm = max(largest_mm, float(world.scale_mm().max()))
+        world.run(0.01)
+    assert largest_mm < 40.0
+    assert world.scale_mm() == pytest.approx(home_mm)
+
+
+def test_a_pause_suspects_no_gauge_and_a_restart_suspects_each(world: World) -> None:
+    assert pause(world, "", 0.01).suspects == ()
+    assert Fault(world).suspects == ("",)
+    assert lost(world, "scale_1", 1).suspects == ("scale_1", "scale_1")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 import pytest
@@ -13,7 +14,10 @@ from compd.live.machine import MachineZero
 from compd.setpoint_states import State
 from docs.generate.state_ends import ENDS, Cause, cause_of_silence, state_within_s, within_s
 from tests.support.paths import CONFIG
-from tests.worlds.faults import line_of, scales, shift, silence, unplug
+from tests.worlds.faults.gauges import shift
+from tests.worlds.faults.lines import cable
+from tests.worlds.faults.replies import silent
+from tests.worlds.faults.wiring import line_of, scales
 from tests.worlds.world import World, built
 
 SETTLED_S = 0.5
@@ -26,11 +30,6 @@ def stand_somewhere(world: World) -> None:
     world.drive([5.0 + link for link in range(len(world.scale_mm()))])
     world.arrive()
     world.run(1.2)
-
-
-def kill_acquisition(world: World, duration_s: float) -> None:
-    world.kill_acquisition()
-    world.hub.at(world.hub.now_s + duration_s, world.start_acquisition)
 
 
 def ended_after_s(world: World, end_s: float, at_most_s: float) -> float:
@@ -66,8 +65,8 @@ def test_a_gauge_that_is_back_is_believed_in_time(name: str, kind: str) -> None:
         line = line_of(world, gauge)
         for silent_s in (0.1, 1.2):
             cause = cause_of_silence(world.configuration, gauge, silent_s)
-            ends_in_time(world, cause, gauge, silent_s, lambda s=silent_s: silence(world, line, s))
-        ends_in_time(world, Cause.LINE, gauge, 1.3, lambda: unplug(world, line, 1.3))
+            ends_in_time(world, cause, gauge, silent_s, partial(silent, world, line, silent_s))
+        ends_in_time(world, Cause.LINE, gauge, 1.3, lambda: cable(world, line, 1.3))
 
 
 @pytest.mark.parametrize("name", MACHINES)
@@ -75,13 +74,12 @@ def test_the_daemon_is_back_in_time(name: str) -> None:
     with built(CONFIG / name, 2) as world:
         stand_somewhere(world)
         for pause_s in (0.3, 2.0):
-            ends_in_time(world, Cause.PAUSED, "", pause_s, lambda s=pause_s: world.pause(s))
+            ends_in_time(world, Cause.PAUSED, "", pause_s, partial(world.pause, pause_s))
 
-        ends_in_time(world, Cause.ACQUISITION, "", 0.3, lambda: kill_acquisition(world, 0.3))
-        zero = world.zero
+        ends_in_time(world, Cause.ACQUISITION, "", 0.0, world.kill_acquisition)
         world.stop()
         world.run(1.5)
-        ends_in_time(world, Cause.STARTED, "", 0.0, lambda: world.start(zero))
+        ends_in_time(world, Cause.STARTED, "", 0.0, world.start)
 
 
 @pytest.mark.parametrize("name", MACHINES)
@@ -93,7 +91,8 @@ def test_a_correction_arrives_in_time(name: str) -> None:
             channel: mm + (0.05 if channel.startswith("joints") else 0.0) for channel, mm in zero.readings_mm.items()
         }
         world.forget()
-        world.commands.zero = MachineZero(zero.zero_hash, zero.taken_at, readings_mm)
+        assert world.daemon is not None
+        world.daemon.commands.zero = MachineZero(zero.zero_hash, zero.taken_at, readings_mm)
         world.run(within_s(world.configuration, Cause.CORRECTION))
         assert State.SLEWING in {told.state for told in world.told}
         assert world.told[-1].state is State.OK
@@ -101,15 +100,17 @@ def test_a_correction_arrives_in_time(name: str) -> None:
 
 def test_a_thermometer_that_is_right_again_is_believed_in_time() -> None:
     with built(CONFIG / "tripod-cmm.yaml", 4) as world:
-        channel = world.trust.index["cabinet.link_1"]
+        assert world.daemon is not None
+        trust = world.daemon.trust
+        channel = trust.index["cabinet.link_1"]
         before = dict(world.shown)
-        shift(world, "cabinet", lambda name: 5.0 if name == "link_1" else 0.0)
+        shift(world, "cabinet", lambda name, degC: degC + (5.0 if name == "link_1" else 0.0))
         world.run(3.0)
-        assert world.trust.doubt[channel] != 0
+        assert trust.doubt[channel] != 0
         world.shown.clear()
         world.shown.update(before)
         world.run(within_s(world.configuration, Cause.QUANTITY, gauges=["cabinet"]))
-        assert world.trust.doubt[channel] == 0
+        assert trust.doubt[channel] == 0
 
 
 @pytest.mark.parametrize("name", MACHINES)
@@ -127,9 +128,9 @@ def test_on_the_move_what_the_limits_of_motion_judge_ends_in_time(name: str) -> 
         configuration = world.configuration
         assert cause_of_silence(configuration, gauge, 0.1) is Cause.BRIEF
         for cause, lasts_s, begin in (
-            (Cause.BRIEF, 0.1, lambda: silence(world, line_of(world, gauge), 0.1)),
+            (Cause.BRIEF, 0.1, lambda: silent(world, line_of(world, gauge), 0.1)),
             (Cause.PAUSED, 0.3, lambda: world.pause(0.3)),
-            (Cause.ACQUISITION, 0.4, lambda: kill_acquisition(world, 0.4)),
+            (Cause.ACQUISITION, 0.0, world.kill_acquisition),
         ):
             drive(1.5)
             begin()
@@ -143,7 +144,7 @@ def test_without_a_scale_that_stayed_a_person_is_asked_for() -> None:
     with built(CONFIG / "tripod-cmm.yaml", 6) as world:
         stand_somewhere(world)
         for gauge in scales(world):
-            silence(world, line_of(world, gauge), 1.0)
+            silent(world, line_of(world, gauge), 1.0)
         world.run(1.0 + within_s(world.configuration, Cause.SILENT, gauges=scales(world)))
         assert world.told[-1].state is State.FAULT
         assert within_s(world.configuration, Cause.ALL_SCALES) == math.inf

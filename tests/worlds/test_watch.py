@@ -10,11 +10,14 @@ import numpy as np
 import pytest
 from scipy.stats import binom
 
+from compd.configuration import load
 from compd.setpoint_states import State
+from tests.support.paths import CONFIG
 from tests.worlds.coverage import NO_FAULT, Case, Coverage, upper_limit
 from tests.worlds.invariants import mostly_valid, nothing_lost, steady_correction, true_reason, within_bound
 from tests.worlds.plan import Event
-from tests.worlds.recovery import Allowed, Recovery
+from tests.worlds.rates import kinds
+from tests.worlds.recovery import CAUSES, Allowed, Recovery, allowed
 from tests.worlds.sight import Happening, Sight
 from tests.worlds.world import Told
 
@@ -31,13 +34,15 @@ def setpoint(time_s: float, correction_mm: float = 0.0, **more: Any) -> Any:
 
 def sight(now: Any, state: State = State.OK, error_um: float = 0.0, u_tip_um: float = 1.0, **more: Any) -> Sight:
     told = Told(now.time_s, state.valid, state, more.pop("reason", ""), u_tip_um, error_um, more.pop("moving", False))
-    given = {"before": None, "recent": (), "suspects": frozenset(), "left_unseen": False} | more
+    given = {"before": None, "recent": (), "suspects": frozenset(), "left_um": error_um} | more
     return Sight(CONFIGURATION, now, told, **given)  # type: ignore[arg-type]
 
 
-def happening(kind: str, ended_s: float = math.inf, is_fault: bool = True) -> Any:
+def happening(
+    kind: str, ended_s: float = math.inf, is_fault: bool = True, targets: tuple[str, ...] | None = None
+) -> Any:
     family, _, name = kind.partition(".")
-    fault = SimpleNamespace(ended_s=ended_s, present=ended_s == math.inf)
+    fault = SimpleNamespace(began_s=0.0, ended_s=ended_s, present=ended_s == math.inf, targets=targets)
     return Happening(Event(0.0, family, name, "", {}), fault, is_fault)  # type: ignore[arg-type]
 
 
@@ -60,8 +65,18 @@ def test_a_setpoint_is_within_three_times_its_bound(
     assert within_bound(sight(now, State.REFUSED, error_um=error_um, u_tip_um=u_tip_um)) == ""
 
 
-def test_a_departure_that_no_reading_shows_is_left_out() -> None:
-    assert within_bound(sight(setpoint(1.0), error_um=50.0, left_unseen=True)) == ""
+def test_what_no_data_can_show_is_left_out_of_the_error() -> None:
+    assert within_bound(sight(setpoint(1.0), error_um=50.0, left_um=2.9)) == ""
+    assert "50 um, 3.1 um of it could be known" in within_bound(sight(setpoint(1.0), error_um=50.0, left_um=3.1))
+
+
+def test_a_departure_has_its_own_case_with_all_of_its_error() -> None:
+    departed = sight(setpoint(1.0), error_um=50.0, left_um=0.5, moving=True, departed=True)
+    assert departed.cases == {Case("departure", NO_FAULT)}
+    assert departed.counted_um == 50.0
+    fault = sight(setpoint(1.0), error_um=50.0, left_um=0.5, recent=(happening("lines.cable"),))
+    assert fault.cases == {Case("after", "lines")}
+    assert fault.counted_um == 0.5
 
 
 @pytest.mark.parametrize(("by_mm", "holds"), [(0.0025, True), (0.0026, False), (-0.0026, False)])
@@ -125,7 +140,11 @@ def test_without_a_fault_nearly_all_is_valid() -> None:
     assert not mostly_valid(coverage, without_faults=False)
 
 
-TIMES = {"default": Allowed(1.0, True), "lines.cable": Allowed(3.0, True), "replies.lost": Allowed(1.0, False)}
+TIMES = {"gauges.jump": Allowed(1.0, True), "lines.cable": Allowed(3.0, True), "replies.lost": Allowed(1.0, False)}
+
+
+def times(configuration: Any, awaited: Any, moved: bool) -> Allowed:
+    return TIMES[awaited[-1].event.name]
 
 
 @pytest.mark.parametrize(
@@ -140,7 +159,7 @@ TIMES = {"default": Allowed(1.0, True), "lines.cable": Allowed(3.0, True), "repl
 )
 def test_setpoints_are_valid_again_in_time(kind: str, accepted_s: float | None, state: State, late_s: float) -> None:
     def course(valid_from_s: float) -> list[str]:
-        recovery = Recovery(TIMES)
+        recovery = Recovery(times)
         recovery.begins(happening(kind, ended_s=10.0))
         if accepted_s is not None:
             recovery.accepted(accepted_s)
@@ -153,6 +172,40 @@ def test_setpoints_are_valid_again_in_time(kind: str, accepted_s: float | None, 
 
 
 def test_nothing_is_late_while_a_fault_is_present() -> None:
-    recovery = Recovery(TIMES)
+    recovery = Recovery(times)
     recovery.begins(happening("lines.cable"))
     assert not recovery.late(sight(setpoint(1e6), State.STOP))
+
+
+@pytest.mark.parametrize(
+    ("kind", "lasts_s", "targets", "at_rest", "in_motion"),
+    [
+        ("computer.pause_in_motion", 0.4, (), False, False),
+        ("computer.pause", 2.0, (), False, False),
+        ("replies.silent", 0.1, ("scale_1",), False, False),
+        ("machine.moved_while_silent", 1.5, ("scale_1",), False, True),
+        ("lines.cable", 1.0, ("scale_1",), False, True),
+        ("lines.gateway", 1.0, None, True, True),
+        ("machine.pushed", 1.0, None, True, True),
+        ("gauges.step", 1.0, ("scale_1",), True, True),
+    ],
+)
+def test_a_person_may_be_asked_for_where_the_reference_says_so(
+    kind: str, lasts_s: float, targets: tuple[str, ...] | None, at_rest: bool, in_motion: bool
+) -> None:
+    configuration = load(CONFIG / "tripod-cmm.yaml")
+    awaited = [happening(kind, lasts_s, targets=targets)]
+    times = [allowed(configuration, awaited, moved) for moved in (False, True)]
+    assert [row.person for row in times] == [at_rest, in_motion]
+    assert all(0.0 < row.within_s < 15.0 for row in times)
+
+
+def test_faults_that_follow_each_other_are_as_long_as_all_of_them() -> None:
+    configuration = load(CONFIG / "tripod-cmm.yaml")
+    one = happening("replies.silent", 0.1, targets=("scale_1",))
+    assert not allowed(configuration, [one], True).person
+    assert allowed(configuration, [one, happening("replies.silent", 1.5, targets=("scale_1",))], True).person
+
+
+def test_every_kind_with_a_cause_is_a_kind_of_fault() -> None:
+    assert set(CAUSES) <= {f"{kind.family}.{kind.name}" for kind in kinds() if kind.fault}

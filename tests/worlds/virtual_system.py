@@ -6,7 +6,6 @@ this process; only the waiting for them is virtual. Files are real ones in a dir
 
 from __future__ import annotations
 
-import errno
 import os
 import selectors
 import socket
@@ -22,6 +21,7 @@ from typing import Any
 from compd.files import Content
 from compd.live.system import ForkedProcess, Privileges, System
 from compd.live.system.realtime import Permission
+from tests.worlds.disk import Disk
 from tests.worlds.hub import Actor, Hub, this_actor
 from tests.worlds.wires import VirtualPorts
 
@@ -90,7 +90,7 @@ class VirtualSelector(selectors.EpollSelector):
         self.close()
         for end in ends:
             if isinstance(end, socket.socket) and not end.getsockopt(socket.SOL_SOCKET, socket.SO_ACCEPTCONN):
-                with suppress(OSError):
+                with suppress(OSError), end:
                     end.shutdown(socket.SHUT_RDWR)
                 end.close()
 
@@ -202,7 +202,7 @@ class VirtualSystem(System):
     Attributes
     ----------
     owner : the process of each actor. processes : those that run, by name. tracebacks : of exceptions that ended one.
-    calendar_s : by how much the calendar's clock was set, s. disk_is_full : whether no file can be written.
+    calendar_s : by how much the calendar's clock was set, s. disk : on which files are written.
     """
 
     def __init__(self, hub: Hub, ports: VirtualPorts) -> None:
@@ -213,7 +213,7 @@ class VirtualSystem(System):
         self.processes: dict[str, VirtualProcess] = {}
         self.tracebacks: list[str] = []
         self.calendar_s = 0.0
-        self.disk_is_full = False
+        self.disk = Disk(hub)
         self.boot()
 
     def boot(self) -> None:
@@ -302,6 +302,10 @@ class VirtualSystem(System):
     # --- files -----------------------------------------------------------------------------------------
 
     def write_files(self, contents: Mapping[Path, Content]) -> None:
-        if self.disk_is_full:
-            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        self.disk.write()
         super().write_files(contents)
+        self.disk.torn -= {path.name for path in contents}
+
+    def rename(self, path: Path, new: Path) -> None:
+        self.disk.rename()
+        super().rename(path, new)

@@ -18,21 +18,21 @@ from copy import deepcopy
 from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
-from unittest.mock import patch
 
 import numpy as np
-import structlog
 import yaml
 
 from compd.configuration import Configuration, load
 from compd.documents import read_document
+from compd.errors import CompdError
 from compd.live.daemon import Daemon
-from compd.live.loop import Loop, Setpoint
+from compd.live.loop import Setpoint
+from compd.live.loop.cycle_state import CycleSettings
 from compd.live.machine import MachineZero
 from compd.live.run_daemon import run_daemon
 from compd.plugins import SIMULATED_GAUGES
 from compd.plugins import load as load_plugin
-from compd.setpoint_states import Mode, State
+from compd.setpoint_states import State
 from compd.simulation import World as Truth
 from compd.simulation.truth.cause import Cause
 from compd.simulation.truth.motion import DRIVES, Drives
@@ -40,7 +40,10 @@ from compd.simulation.truth.strengths import Strengths
 from compd.simulation.wires.server import STEP_S, LiveWorld, Sensing
 from tests.worlds.clients import Clients
 from tests.worlds.controller import Controller
+from tests.worlds.disk import recording_to
 from tests.worlds.hub import Hub
+from tests.worlds.observed import logged, observed
+from tests.worlds.tips import tip_mm, true_tip_mm
 from tests.worlds.virtual_system import VirtualSystem
 from tests.worlds.wires import VirtualPorts, Wire
 
@@ -50,6 +53,8 @@ SUPERVISOR, ACQUISITION, LOOP, SERVICE = "supervisor", "acquisition", "loop", "s
 NEXT_LOOP = "next loop"
 # `RestartSec` of systemd/compd.service, s.
 RESTART_S = 0.1
+# Of a unit that a person restarts, s: until it starts.
+STOPPED_S = 2.0
 # Of a computer that boots, s: until the daemon starts.
 BOOT_S = 5.0
 # Until every gauge has been read often enough after a start.
@@ -58,6 +63,8 @@ ZERO_WITHIN_S = 6.0
 # Setpoints per second of the program that watches.
 WATCHED_HZ = 20.0
 _LOG_ENTRIES = 1000
+# Of each channel: true values that its device sensed last.
+_SENSED = 512
 
 
 class Told(NamedTuple):
@@ -79,7 +86,8 @@ class World:
     ----------
     wires : by name of the line. shown : by gauge, changes what its device senses: (channel, true value) -> value.
     told : every setpoint since the last `forget`. hearers : called with each setpoint and with what is true of it.
-    clients, controller : of the daemon. log : the last entries of its log. died : tracebacks in the daemon.
+    clients, controller : of the daemon. cycle : settings of its newest loop. log : the last entries of its log.
+    died : tracebacks in the daemon.
     """
 
     def __init__(self, hub: Hub, configuration: Configuration, truth: Truth, directory: Path) -> None:
@@ -87,8 +95,10 @@ class World:
         self.configuration = configuration
         self.truth = truth
         self.shown: dict[str, Callable[[str, float], float]] = {}
+        self._sensed: dict[str, deque[tuple[float, float]]] = {}
         self.told: list[Told] = []
         self.hearers: list[Callable[[Setpoint, Told], None]] = []
+        self.beginners: list[Callable[[], object]] = []
         self.log: deque[Mapping[str, Any]] = deque(maxlen=_LOG_ENTRIES)
         self.directory = directory
         self.ports = VirtualPorts()
@@ -96,6 +106,7 @@ class World:
         self.wires: dict[str, Wire] = {}
         self.clients = Clients(self.system, Path(configuration.sockets.unix.path))
         self.daemon: Daemon | None = None
+        self.cycle: CycleSettings | None = None
         self.controller = Controller(self.system, configuration, lambda scale_mm: self.drive(scale_mm.tolist()))
         self._on = False
         self._to_close: list[Daemon] = []
@@ -121,8 +132,21 @@ class World:
 
     def _sense(self, gauge: str, sense: Callable[[str], float], channel: str) -> float:
         value = sense(channel)
+        name = f"{gauge}.{channel}"
+        self._sensed.setdefault(name, deque(maxlen=_SENSED)).append((self.hub.now_s, value))
         shown = self.shown.get(gauge)
         return value if shown is None else shown(channel, value)
+
+    def sensed_at(self, channel: str, time_s: float) -> float:
+        """What a device would have shown without a fault at the sample nearest to this time (s); nan before any."""
+        after_s, value = math.inf, math.nan
+        for sampled_s, sampled in reversed(self._sensed.get(channel, ())):  # nearly always among the newest
+            if time_s - sampled_s >= after_s - time_s:
+                break
+            after_s, value = sampled_s, sampled
+            if sampled_s <= time_s:
+                break
+        return value
 
     # --- the daemon ------------------------------------------------------------------------------------
 
@@ -132,7 +156,11 @@ class World:
         self.system.start(self._run_daemon, SUPERVISOR)
 
     def _run_daemon(self) -> None:
-        failed = run_daemon(load(self.configuration.path), self.system)
+        try:
+            failed = run_daemon(load(self.configuration.path), self.system)
+        except CompdError as error:  # the command says so, and fails
+            self.log.append({"event": "compd run", "problem": str(error), "time_s": self.hub.now_s})
+            failed = True
         if failed and self._on:
             self.hub.at(self.hub.now_s + RESTART_S, self.start)
 
@@ -140,6 +168,8 @@ class World:
         """A daemon has been made: this one, or the one of another configuration."""
         self.daemon = daemon
         self._to_close.append(daemon)
+        for begin in self.beginners:
+            begin()
 
     def closed(self, daemon: Daemon) -> None:
         """A daemon has closed its descriptors."""
@@ -179,7 +209,7 @@ class World:
     def restart(self) -> None:
         """A person restarts the unit."""
         self.end()
-        self.hub.at(self.hub.now_s + 2.0, self.start)
+        self.hub.at(self.hub.now_s + STOPPED_S, self.start)
 
     def reload(self, change: Callable[[dict[str, Any]], None] = lambda document: None) -> None:
         """A person changes the configuration and reloads it."""
@@ -214,6 +244,11 @@ class World:
         return [*self.system.tracebacks, *(entry["exception"] for entry in self.log if entry.get("exception"))]
 
     @property
+    def running(self) -> Configuration:
+        """The configuration that the daemon runs with."""
+        return self.configuration if self.daemon is None else self.daemon.configuration
+
+    @property
     def zero(self) -> MachineZero:
         """The machine zero that is used."""
         assert self.daemon is not None
@@ -231,12 +266,10 @@ class World:
         """A person has looked at a gauge."""
         self.clients.ask({"class": "ACCEPT", "gauge": gauge})
 
-    def adopt(self, model: Path | None) -> None:
-        """A person adopts a model file, or none."""
-        if model is None:
-            self.clients.ask({"class": "MODEL", "file": ""})
-        else:
-            self.clients.ask({"class": "MODEL", "file": str(model)}, model)
+    def adopt(self, model: Path | None, shadow: bool = False) -> None:
+        """A person adopts a model file, or none; or lets it run as the shadow."""
+        beside = {"shadow": True} if shadow else {}
+        self.clients.ask({"class": "MODEL", "file": "" if model is None else str(model), **beside}, model)
 
     def release(self) -> None:
         """A person takes the controller's role away."""
@@ -285,32 +318,23 @@ class World:
                 return True
         return False
 
-    def _note(self, setpoint: Setpoint) -> None:
+    def tip_error_mm(self, setpoint: Setpoint) -> np.ndarray:
+        """(3,) of a valid setpoint of now."""
+        with self._live.now() as truth:
+            return tip_mm(setpoint, truth.tip_frame) - true_tip_mm(setpoint, truth)
+
+    def note(self, setpoint: Setpoint) -> None:
+        """A loop has made a setpoint."""
         error_um = math.nan
         with self._live.now() as truth:
             if setpoint.values is not None:
-                error_um = 1e3 * math.dist(_tip_mm(setpoint, truth.tip_frame), _true_tip_mm(setpoint, truth))
+                error_um = 1e3 * math.dist(tip_mm(setpoint, truth.tip_frame), true_tip_mm(setpoint, truth))
             moving = truth.phase == "moving"
         u_tip_um = math.nan if setpoint.u_tip_um is None else setpoint.u_tip_um
         told = Told(setpoint.time_s, setpoint.valid, setpoint.state, setpoint.reason, u_tip_um, error_um, moving)
         self.told.append(told)
         for hear in self.hearers:
             hear(setpoint, told)
-
-
-def _true_tip_mm(setpoint: Setpoint, truth: Truth) -> np.ndarray:
-    """Where the tip is; in machine-tool mode where it were if the scales were at their setpoints."""
-    assert setpoint.values is not None
-    if setpoint.mode is Mode.MACHINE_TOOL:
-        return truth.tip_for(setpoint.values.scale_setpoint_mm.tolist())
-    state = truth.look()
-    return state.tip_M if truth.tip_frame == "M" else state.tip_P
-
-
-def _tip_mm(setpoint: Setpoint, frame: str) -> np.ndarray:
-    values = setpoint.values
-    assert values is not None
-    return np.asarray(values.tip_M_mm if frame == "M" else values.tip_P_mm)
 
 
 @contextmanager
@@ -350,9 +374,10 @@ def built(
         )
         hub = Hub(seed)
         world = World(hub, configuration, truth, directory)
-        stack.enter_context(_logged(world))
+        stack.enter_context(logged(world))
 
-        stack.enter_context(_observed(world))
+        stack.enter_context(observed(world))
+        stack.enter_context(recording_to(world.system.disk))
         stack.callback(hub.close)
         stack.callback(world.stop)
         world.start()
@@ -361,46 +386,3 @@ def built(
         assert world.until_ok(ZERO_WITHIN_S), (world.told[-1:], world.clients.answers, world.died)
         world.clients.watch(WATCHED_HZ)
         yield world
-
-
-@contextmanager
-def _observed(world: World) -> Iterator[None]:
-    """Daemons and loops tell their world of themselves."""
-
-    class ObservedDaemon(Daemon):
-        def __init__(self, *arguments: Any, **named: Any) -> None:
-            super().__init__(*arguments, **named)
-            world.begun(self)
-
-        def close(self, after: Daemon | None = None) -> None:
-            super().close(after)
-            world.closed(self)
-
-    class ObservedLoop(Loop):
-        def __init__(self, cycle: Any, latest: Any, commands: Any, sinks: Any, *arguments: Any) -> None:
-            super().__init__(cycle, latest, commands, [*sinks, world._note], *arguments)
-
-    with (
-        patch("compd.live.run_daemon.Daemon", ObservedDaemon),
-        patch("compd.live.processes.loop_process.Loop", ObservedLoop),
-    ):
-        yield
-
-
-@contextmanager
-def _logged(world: World) -> Iterator[None]:
-    """The daemon's log goes to its world."""
-
-    def note(_logger: Any, _method: str, entry: Any) -> Any:
-        world.log.append({**entry, "time_s": world.hub.now_s})
-        raise structlog.DropEvent
-
-    before = structlog.get_config()
-    structlog.configure(
-        processors=[structlog.processors.add_log_level, structlog.processors.format_exc_info, note],
-        cache_logger_on_first_use=False,
-    )
-    try:
-        yield
-    finally:
-        structlog.configure(**before)

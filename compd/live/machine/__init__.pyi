@@ -1,5 +1,6 @@
 from .machine_zero import MachineZero as MachineZero
 from .machine_zero import load_zero as load_zero
+from .machine_zero import withdraw_zero as withdraw_zero
 from .machine_zero import zero_at_start as zero_at_start
 from .model_loader import LiveModel as LiveModel
 from .model_loader import ModelLoader as ModelLoader

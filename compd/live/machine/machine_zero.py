@@ -22,6 +22,7 @@ OLD_FILE_NAME = "machine-zero.json.old"
 # Format 1, of releases up to 0.2, has no checksum; neither 1 nor 2 has quantities and ports.
 _FORMAT = 3
 _MAX_FILE_BYTES = 1_000_000
+_MAKE_WRITABLE = "make the state directory writable for the daemon's user, then take zero again"
 _TAKE_ONE = "bring the machine to its zero position and run `compd zero`"
 
 log = structlog.get_logger()
@@ -100,7 +101,7 @@ class MachineZero:
             raise StateError.of(
                 str(path),
                 f"machine zero cannot be written: {error.strerror}",
-                next_step="make the state directory writable for the daemon's user, then take zero again",
+                next_step=_MAKE_WRITABLE,
             ) from error
         return path
 
@@ -114,6 +115,23 @@ def _old_file(directory: Path, system: System) -> dict[Path, bytes]:
         return {directory / OLD_FILE_NAME: system.read_file(directory / FILE_NAME, _MAX_FILE_BYTES)}
     except FileNotFoundError:
         return {}
+
+
+def withdraw_zero(directory: Path, system: System) -> None:
+    """Take the machine zero in this directory out of use, before its gauges are accepted to take another one.
+
+    A daemon that starts before the other one is written would use it with gauges that have lost their counts. The file
+    stays as OLD_FILE_NAME. Raises StateError when the disk refuses.
+    """
+    path = directory / FILE_NAME
+    try:
+        system.rename(path, directory / OLD_FILE_NAME)
+    except FileNotFoundError:
+        pass
+    except OSError as error:
+        raise StateError.of(
+            str(path), f"machine zero cannot be replaced: {error.strerror}", next_step=_MAKE_WRITABLE
+        ) from error
 
 
 def zero_at_start(
@@ -156,7 +174,9 @@ def load_zero(directory: Path, zero_hash: str, channels: tuple[str, ...], system
     try:
         content = json.loads(system.read_file(path, _MAX_FILE_BYTES).decode())
     except FileNotFoundError as error:
-        raise StateError.of(str(path), "machine zero has never been taken", next_step=_TAKE_ONE) from error
+        withdrawn = system.has_file(directory / OLD_FILE_NAME)
+        what = f"was withdrawn to take it anew; it is in {OLD_FILE_NAME}" if withdrawn else "has never been taken"
+        raise StateError.of(str(path), f"machine zero {what}", next_step=_TAKE_ONE) from error
     except OSError as error:
         raise StateError.of(str(path), f"machine zero cannot be read: {error.strerror}") from error
     except (ValueError, RecursionError) as error:

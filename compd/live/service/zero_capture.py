@@ -15,7 +15,7 @@ import structlog
 from compd.errors import StateError
 from compd.gauge import Quality
 from compd.live.loop import Commands
-from compd.live.machine import MachineWires, MachineZero
+from compd.live.machine import MachineWires, MachineZero, withdraw_zero
 from compd.live.memory import Latest
 from compd.live.service.message_keys.answers import ZeroKeys
 from compd.live.service.messages import ErrorCode, ProtocolError
@@ -161,7 +161,8 @@ class ZeroCapture:
                     f"not believed: {'; '.join(distrusted)}. Machine zero takes every gauge as it reads now",
                 )
             # They are believed again before it is known whether zero can be taken: with the one until now their
-            # readings would be wrong by whatever they have lost.
+            # readings would be wrong by whatever they have lost, also in a daemon that starts meanwhile.
+            withdraw_zero(self._directory, self._system)
             self._commands.zero = StateError.of(
                 "machine zero",
                 "gauges were accepted in order to take it",

@@ -17,7 +17,7 @@ from pathlib import Path
 from uuid import UUID
 
 from compd.clock import MonotonicClock
-from compd.files import Content, read_small_file, write_files
+from compd.files import Content, read_small_file, sync_directory, write_files
 from compd.lines import PORTS, Ports
 from compd.live.system.datagrams import Datagrams
 from compd.live.system.forked_process import ForkedProcess
@@ -87,6 +87,15 @@ class System(MonotonicClock):
         for path in contents:
             path.parent.mkdir(parents=True, exist_ok=True)
         write_files(contents)
+
+    def rename(self, path: Path, new: Path) -> None:
+        """Give a file another path in its directory, where it replaces what is there. Raises OSError."""
+        path.replace(new)
+        sync_directory(new.parent)
+
+    def has_file(self, path: Path) -> bool:
+        """Whether there is a file at this path."""
+        return path.is_file()
 
     @contextmanager
     def signals(self) -> Iterator[int]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import os
 import threading
@@ -15,7 +16,7 @@ from compd.errors import StateError
 from compd.files import checksum_of
 from compd.gauge import Quality, bad, good
 from compd.live.loop.commands import Commands
-from compd.live.machine.machine_zero import FILE_NAME, OLD_FILE_NAME, MachineZero, load_zero
+from compd.live.machine.machine_zero import FILE_NAME, OLD_FILE_NAME, MachineZero, load_zero, withdraw_zero
 from compd.live.machine.wiring import MachineWires
 from compd.live.memory.latest import Latest
 from compd.live.service.zero_capture import REST_TOLERANCE_MM, ZeroCapture
@@ -344,6 +345,8 @@ def test_a_gauge_that_was_accepted_for_a_zero_that_is_then_refused_leaves_no_zer
     assert taking.take(replace=True)["code"] == "zero_refused"
     assert isinstance(taking.commands.zero, StateError)
     assert "compd zero" in str(taking.commands.zero)
+    with pytest.raises(StateError, match="withdrawn"):  # nor after a restart
+        load_zero(tmp_path, taking.taker._zero_hash, (), THIS_COMPUTER)
 
 
 def test_whatever_goes_wrong_is_answered(tmp_path, monkeypatch):
@@ -368,3 +371,27 @@ def test_the_end_does_not_wait_for_a_disk_that_hangs(tmp_path, monkeypatch):
     assert taking.answers == []
     disk.set()
     assert taking.taker._job.join(PATIENCE_S)
+
+
+def test_a_daemon_that_starts_while_zero_is_taken_anew_does_not_use_the_one_before(tmp_path):
+    path = ZERO.save(tmp_path, THIS_COMPUTER)
+    before = path.read_bytes()
+    withdraw_zero(tmp_path, THIS_COMPUTER)
+    with pytest.raises(StateError, match=f"was withdrawn to take it anew; it is in {OLD_FILE_NAME}"):
+        load_zero(tmp_path, "abc", ("a.1", "b.1"), THIS_COMPUTER)
+    withdraw_zero(tmp_path, THIS_COMPUTER)  # there is none
+    assert (tmp_path / OLD_FILE_NAME).read_bytes() == before
+    ZERO.save(tmp_path, THIS_COMPUTER)
+    assert load_zero(tmp_path, "abc", ("a.1", "b.1"), THIS_COMPUTER) == ZERO
+    assert (tmp_path / OLD_FILE_NAME).read_bytes() == before
+
+
+def test_a_zero_that_the_disk_keeps_is_not_taken_anew(tmp_path):
+    class ReadOnly(System):
+        def rename(self, path, new):
+            raise OSError(errno.EROFS, "Read-only file system")
+
+    ZERO.save(tmp_path, THIS_COMPUTER)
+    with pytest.raises(StateError, match="cannot be replaced: Read-only file system"):
+        withdraw_zero(tmp_path, ReadOnly())
+    assert load_zero(tmp_path, "abc", ("a.1", "b.1"), THIS_COMPUTER) == ZERO

@@ -12,13 +12,13 @@ _HERE = Path(__file__).parent
 
 
 class Defect(NamedTuple):
-    """What a defect is, and which invariant finds it.
+    """What a defect is, and which invariants find it.
 
     shows : which fault shows it. beside : kinds of such faults in rates.yaml. shown_by : the test of a scenario.
     """
 
     what: str
-    invariant: str
+    invariants: Sequence[str]
     shows: str
     beside: Sequence[str]
     shown_by: str

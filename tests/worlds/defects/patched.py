@@ -33,13 +33,14 @@ class Patched(NamedTuple):
 
     def start(self, module: str, *arguments: str) -> subprocess.Popen[str]:
         """Start a module of the tree as a program that imports this copy of compd."""
-        return started(["-m", "tests.worlds.defects.start", str(self.path), self.digest, module, *arguments])
+        return started("tests.worlds.defects.start", str(self.path), self.digest, module, *arguments)
 
 
-def started(arguments: list[str]) -> subprocess.Popen[str]:
-    """Start Python in the tree; its errors come out here."""
+def started(module: str, *arguments: str) -> subprocess.Popen[str]:
+    """Start a module of the tree as a program; its errors come out here."""
     environment = {key: value for key, value in os.environ.items() if key != "PYTHONPATH"}
-    return subprocess.Popen([sys.executable, *arguments], cwd=ROOT, env=environment, stdin=PIPE, stdout=PIPE, text=True)
+    command = [sys.executable, "-m", module, *arguments]
+    return subprocess.Popen(command, cwd=ROOT, env=environment, stdin=PIPE, stdout=PIPE, text=True)
 
 
 @contextmanager

@@ -53,7 +53,7 @@ def test_a_scenario_fails_with_the_patch_and_holds_without(name: str) -> None:
     scenario = DEFECTS[name].shown_by
     with patched(PATCHES[name]) as tree:
         assert ended(tree.start("pytest", *AS_TEST, scenario)) == FAILED
-    assert ended(started(["-m", "pytest", *AS_TEST, scenario])) == PASSED
+    assert ended(started("pytest", *AS_TEST, scenario)) == PASSED
 
 
 @pytest.mark.long

@@ -18,7 +18,7 @@ class Fault:
     ----------
     began_s, ended_s : virtual time, s; `ended_s` is infinite while the fault is present.
     mendable : whether a person who looks at the machine ends it.
-    targets : names of the gauges and lines that it affects; empty for all of them.
+    targets : names of the gauges and lines that it affects; None for all of them, empty for none.
     """
 
     def __init__(
@@ -27,7 +27,7 @@ class Fault:
         undo: Callable[[], object] = lambda: None,
         lasts_s: float = math.inf,
         mendable: bool = False,
-        targets: tuple[str, ...] = (),
+        targets: tuple[str, ...] | None = None,
     ) -> None:
         """undo : called once, at the end. lasts_s : after which it ends by itself, s."""
         self._hub = world.hub
@@ -40,6 +40,11 @@ class Fault:
         self.ended_s = math.inf
         if math.isfinite(lasts_s):
             self._hub.at(self.began_s + lasts_s, self.end)
+
+    @property
+    def suspects(self) -> tuple[str, ...]:
+        """Its targets; "" for all of them."""
+        return ("",) if self.targets is None else self.targets
 
     @property
     def present(self) -> bool:

@@ -5,7 +5,7 @@ What stays wrong is mended after a time, or when a person looks at the machine.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from operator import add
 
@@ -14,6 +14,7 @@ import numpy as np
 from tests.worlds.faults.away import FROM_ZERO, OLD, away
 from tests.worlds.faults.fault import Fault
 from tests.worlds.faults.layers import Distortion, distort, only, unplug
+from tests.worlds.faults.machine import driven
 from tests.worlds.faults.wiring import line_of, wired
 from tests.worlds.world import World
 
@@ -23,6 +24,27 @@ MM_PER_INCH = 25.4
 def jump(world: World, target: str, by: float, lasts_s: float) -> Fault:
     """The channel `target` shows more by `by`, in its unit."""
     return _wrong(world, target, lasts_s, lambda value: value + by)
+
+
+def step(world: World, target: str, by: float, lasts_s: float) -> Fault:
+    """The scale `target` shows more by `by` (mm), which is small: a particle, a slipped clamp."""
+    return jump(world, target, by, lasts_s)
+
+
+def jump_in_motion(
+    world: World,
+    target: str,
+    to_mm: Sequence[float],
+    mm_per_s: float,
+    mm_per_s2: float,
+    after_s: float,
+    by: float,
+    lasts_s: float,
+) -> Fault:
+    """The links drive, as in `machine.driven`; `after_s` (s) later the scale `target` shows more by `by` (mm)."""
+    driven(world, target, to_mm, mm_per_s, mm_per_s2)
+    hub, jumps_s = world.hub, world.hub.now_s + after_s
+    return _wrong(world, target, after_s + lasts_s, lambda value: value + by * (hub.now_s >= jumps_s))
 
 
 def thermometer_jump(world: World, target: str, by: float, lasts_s: float) -> Fault:

@@ -1,8 +1,9 @@
-"""What a machine does: driven at any speed, jogged, pushed while its scales are away, stopped by a collision."""
+"""What a machine does: driven at any speed, jogged, moved while scales are silent or away, stopped by a collision."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from contextlib import suppress
 
 import numpy as np
 
@@ -10,30 +11,65 @@ from compd.errors import CompdError
 from compd.simulation.truth.motion import Drives, SetpointMotion, standing
 from tests.worlds.faults.away import OLD, away
 from tests.worlds.faults.fault import Fault
-from tests.worlds.faults.layers import unplug
-from tests.worlds.faults.wiring import lines_of_scales, wired
+from tests.worlds.faults.layers import Remove, disturb, unplug
+from tests.worlds.faults.wiring import lines_of_scales, names_on, wired
+from tests.worlds.wires import lost
 from tests.worlds.world import World
 
 # From the loss of the scales to the push, s.
 _PUSHED_AFTER_S = 0.1
+_FASTEST_MM_PER_S = 1e3
+# How often somebody looks whether the machine stands, and how long it then rests, s.
+_LOOKS_EVERY_S, _RESTS_S = 0.05, 0.3
 
 
-def driven(world: World, target: str, to_mm: Sequence[float], mm_per_s: float) -> Fault:
-    """The links drive to `to_mm` (n); the longest at `mm_per_s`."""
-    _drive(world, np.array(to_mm), mm_per_s)
+def driven(world: World, target: str, to_mm: Sequence[float], mm_per_s: float, mm_per_s2: float) -> Fault:
+    """The links drive to `to_mm` (n) at up to `mm_per_s`, with `mm_per_s2`."""
+    _drive(world, np.array(to_mm), Drives(mm_per_s, mm_per_s2))
     return Fault(world, lasts_s=0.0)
 
 
-def jogged(world: World, target: str, by_mm: Sequence[float], mm_per_s: float) -> Fault:
+def jogged(world: World, target: str, by_mm: Sequence[float], mm_per_s: float, mm_per_s2: float) -> Fault:
     """The links drive by `by_mm` (n)."""
-    _drive(world, world.scale_mm() + by_mm, mm_per_s)
+    _drive(world, world.scale_mm() + by_mm, Drives(mm_per_s, mm_per_s2))
     return Fault(world, lasts_s=0.0)
 
 
 def rests(world: World, target: str) -> Fault:
     """The machine stops and rests until it is driven again."""
-    _drive(world, world.scale_mm(), 1e3)
+    _drive(world, world.scale_mm(), _fast(world))
     return Fault(world, lasts_s=0.0)
+
+
+def moved_while_silent(
+    world: World,
+    target: str,
+    by_mm: Sequence[float],
+    mm_per_s: float,
+    mm_per_s2: float,
+    after_s: float,
+    lasts_s: float,
+) -> Fault:
+    """The machine stops, and the line `target` answers nothing for `lasts_s` (s).
+
+    The links begin to drive by `by_mm` (n) `after_s` (s) after its last answer.
+    """
+    hub = world.hub
+    undo: list[Remove] = []
+    fault = Fault(world, lambda: [one() for one in undo], targets=names_on(world, target))
+
+    def begin() -> None:
+        if fault.present:
+            undo.append(disturb(world.wires[target], lost))
+            hub.at(hub.now_s + after_s, depart)
+            hub.at(hub.now_s + lasts_s, fault.end)
+
+    def depart() -> None:
+        _drive(world, world.scale_mm() + by_mm, Drives(mm_per_s, mm_per_s2))
+
+    rests(world, target)
+    _when_it_stands(world, begin)
+    return fault
 
 
 def pushed(world: World, target: str, by_mm: Sequence[float], away_s: float, keeps: bool, stays_s: float) -> Fault:
@@ -42,7 +78,7 @@ def pushed(world: World, target: str, by_mm: Sequence[float], away_s: float, kee
     keeps : the displays show afterwards what they showed before; else the truth.
     """
     place_mm = world.scale_mm() + by_mm
-    world.hub.at(world.hub.now_s + _PUSHED_AFTER_S, lambda: _drive(world, place_mm, 1e3))
+    world.hub.at(world.hub.now_s + _PUSHED_AFTER_S, lambda: _drive(world, place_mm, _fast(world)))
     channels = [channel for channel in wired(world.configuration) if channel.kind == "scale"] if keeps else []
     lines = lines_of_scales(world)
     return away(world, lines, lambda line: unplug(world.wires[line]), away_s, channels, OLD, stays_s)
@@ -55,14 +91,34 @@ def collides(world: World, target: str) -> Fault:
     return Fault(world, lasts_s=0.0)
 
 
-def _drive(world: World, to_mm: np.ndarray, mm_per_s: float) -> None:
-    """Drive at up to `mm_per_s`; a place beyond the stroke is refused, as a controller does."""
+def _when_it_stands(world: World, then: Callable[[], object]) -> None:
+    """Call a function when the machine has stood for a moment."""
+    hub = world.hub
+
+    def look() -> None:
+        world.scale_mm()  # moves the truth to the present
+        if world.moving:
+            hub.at(hub.now_s + _LOOKS_EVERY_S, look)
+        else:
+            hub.at(hub.now_s + _RESTS_S, then)
+
+    look()
+
+
+def _fast(world: World) -> Drives:
+    """As fast as the drives can go, with the acceleration that they had last."""
+    return world.truth._drives._replace(mm_per_s=_FASTEST_MM_PER_S)
+
+
+def _drive(world: World, to_mm: np.ndarray, drives: Drives) -> None:
+    """Drive within the limits `drives`; a place beyond the stroke is refused, as a controller does."""
     truth = world.truth
-    truth._drives = Drives(mm_per_s, truth._drives.mm_per_s2)
+    truth._drives = drives
     if isinstance(truth._motion, SetpointMotion):
-        # the speed that a link has is at most that of its drives
-        truth._motion._drives = Drives(max(mm_per_s, *np.abs(truth._motion.speeds_mm_per_s)), truth._drives.mm_per_s2)
-    try:
+        if world.moving:  # links that move are not faster than their drives, and stop within their stroke
+            before = truth._motion._drives
+            fastest_mm_per_s = float(np.abs(truth._motion.speeds_mm_per_s).max())
+            drives = Drives(max(drives.mm_per_s, fastest_mm_per_s), max(drives.mm_per_s2, before.mm_per_s2))
+        truth._motion._drives = drives
+    with suppress(CompdError):
         world.drive(to_mm.tolist())
-    except CompdError:
-        return
