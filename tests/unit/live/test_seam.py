@@ -244,8 +244,14 @@ def test_the_processes_of_a_daemon_use_the_computer_that_it_is_given(tmp_path, m
     monkeypatch.setattr(daemon.control, "keeps_turn", keeps_turn)
     daemon.loop_process.run(1)
     assert computer.now_s == pytest.approx(5e6 + 4 * daemon.period_s), "cycles of its time"
-    computer.on_look = lambda: computer.looks < 20 or daemon.control.enter(Phase.STOPPING, "the end")
     (acquisition,) = daemon.acquisition
+
+    def on_look():
+        lines = acquisition.status()
+        if lines and all("detail" in line for line in lines.values()):  # its threads are real ones
+            daemon.control.enter(Phase.STOPPING, "the end")
+
+    computer.on_look = on_look
     acquisition.run()
     lines = acquisition.status()
     assert set(lines) == set(configured.lines)
