@@ -8,8 +8,11 @@ from pathlib import Path
 import pytest
 import yaml
 
+from compd.configuration import load
+from compd.machine_kinds import KINDS
 from tests.worlds.faults.computer import PROCESSES
-from tests.worlds.plan import Plan, draw
+from tests.worlds.machines import MEASURED, machine_file, measured_errors
+from tests.worlds.plan import MM_PER_S2, Plan, draw
 from tests.worlds.rates import FILE, NONE, kinds, kinds_of
 
 MACHINES = ("tripod-cmm.yaml", "hexapod.yaml", "linear-delta")
@@ -70,3 +73,19 @@ def test_a_kind_that_nothing_plays_is_refused(tmp_path: Path) -> None:
     (tmp_path / "rates.yaml").write_text(yaml.safe_dump(data))
     with pytest.raises(ValueError, match=r"lines\.lightning"):
         kinds("campaign", tmp_path / "rates.yaml")
+
+
+def test_the_acceleration_that_is_stated_is_that_of_the_fastest_drive() -> None:
+    plan = draw(4, 600.0, kinds("campaign"), "tripod-cmm.yaml")
+    drives = [event.parameters["mm_per_s2"] for event in plan.events if "mm_per_s2" in event.parameters]
+    assert plan.mm_per_s2 == max(drives) > 10 * min(drives)
+    assert draw(4, 600.0, [], "tripod-cmm.yaml").mm_per_s2 == MM_PER_S2
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_measured_machine_has_a_line_for_each_scale_and_one_for_its_joints(kind: str, tmp_path: Path) -> None:
+    configuration = load(machine_file(f"{kind}{MEASURED}", tmp_path))
+    scales = [wire.gauge for wire in configuration.wiring.scale]
+    assert [*configuration.lines] == [*scales, "joints"]
+    assert len(configuration.wiring.joint) == len(scales)
+    assert not measured_errors(configuration).ball_runout_um

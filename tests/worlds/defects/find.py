@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import json
 import subprocess
+import sys
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from contextlib import AbstractContextManager, ExitStack
@@ -94,15 +95,19 @@ def search(names: Sequence[str], seeds: Sequence[int], how: Search, jobs: int = 
 def _search(name: str, seed: int, how: Search, tree: Patched | None) -> Found:
     defect, plan = DEFECTS[name], how.order(seed).plan
     start = started if tree is None else tree.start
+    whole = without(defect, tree is not None)
     with Played(start("tests.worlds.defects.play", *how.arguments(seed))) as world:
         refused: dict[str, float] = {}
-        for mark in world.marks():
-            if mark.time_s - refused.get(mark.what, -LASTS_S) < LASTS_S or not _may_be(defect, mark):
-                continue
-            shown = shows(plan, mark, lambda part, what: _fails(start, part, what), without(defect, tree is not None))
-            if shown is not None:
-                return Found(name, seed, mark.time_s / 60, mark, shown)
-            refused[mark.what] = mark.time_s
+        try:
+            for mark in world.marks():
+                if mark.time_s - refused.get(mark.what, -LASTS_S) < LASTS_S or not _may_be(defect, mark):
+                    continue
+                shown = shows(plan, mark, lambda part, what: _fails(start, part, what), whole)
+                if shown is not None:
+                    return Found(name, seed, mark.time_s / 60, mark, shown)
+                refused[mark.what] = mark.time_s
+        except RuntimeError as error:  # the search of the others goes on
+            print(f"{name}, seed {seed}: {error}", file=sys.stderr)
         return Found(name, seed, world.time_s / 60)
 
 

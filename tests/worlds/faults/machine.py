@@ -23,15 +23,15 @@ _FASTEST_MM_PER_S = 1e3
 _LOOKS_EVERY_S, _RESTS_S = 0.05, 0.3
 
 
-def driven(world: World, target: str, to_mm: Sequence[float], mm_per_s: float, mm_per_s2: float) -> Fault:
-    """The links drive to `to_mm` (n) at up to `mm_per_s`, with `mm_per_s2`."""
-    _drive(world, np.array(to_mm), Drives(mm_per_s, mm_per_s2))
+def driven(world: World, target: str, to_mm: Sequence[float], mm_per_s: float, mm_per_s2: float | None = None) -> Fault:
+    """The links drive to `to_mm` (n) at up to `mm_per_s`, with `mm_per_s2`; None for that of the drive before."""
+    _drive(world, np.array(to_mm), _drives(world, mm_per_s, mm_per_s2))
     return Fault(world, lasts_s=0.0)
 
 
-def jogged(world: World, target: str, by_mm: Sequence[float], mm_per_s: float, mm_per_s2: float) -> Fault:
+def jogged(world: World, target: str, by_mm: Sequence[float], mm_per_s: float, mm_per_s2: float | None = None) -> Fault:
     """The links drive by `by_mm` (n)."""
-    _drive(world, world.scale_mm() + by_mm, Drives(mm_per_s, mm_per_s2))
+    _drive(world, world.scale_mm() + by_mm, _drives(world, mm_per_s, mm_per_s2))
     return Fault(world, lasts_s=0.0)
 
 
@@ -105,9 +105,13 @@ def _when_it_stands(world: World, then: Callable[[], object]) -> None:
     look()
 
 
+def _drives(world: World, mm_per_s: float, mm_per_s2: float | None) -> Drives:
+    return Drives(mm_per_s, world.truth._drives.mm_per_s2 if mm_per_s2 is None else mm_per_s2)
+
+
 def _fast(world: World) -> Drives:
     """As fast as the drives can go, with the acceleration that they had last."""
-    return world.truth._drives._replace(mm_per_s=_FASTEST_MM_PER_S)
+    return _drives(world, _FASTEST_MM_PER_S, None)
 
 
 def _drive(world: World, to_mm: np.ndarray, drives: Drives) -> None:
