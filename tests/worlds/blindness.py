@@ -2,7 +2,8 @@
 
 A fault is invisible while all that the gauges have shown could have come from a machine without a fault: each length
 moves within what its gauge's configuration states, each quantity changes at its usual rate, noise is noise, and what
-is measured twice agrees. A gap in which a display could have restarted is evidence of whatever happened in it.
+is measured twice agrees. A gap in which a display could have restarted is evidence of whatever happened in it, and a
+step of one length at rest, while all others stand, is evidence of itself: it may be motion, but a bound can keep it.
 
     watch = Blindness.of(configuration)
     with listening(watch):                      # every reading and every failed poll of the daemon
@@ -35,6 +36,8 @@ from tests.worlds.redundancy import FRAME_GIVE_UM, Relation, stated_relations
 
 # Share of a new interval in the usual one.
 _NEWEST = 0.05
+# Readings of one place that show a part at rest.
+_STANDS = 3
 
 
 class Stated(NamedTuple):
@@ -97,6 +100,9 @@ class _Channel:
     missed: bool = False
     lost_s: float = math.inf
     since_s: float = math.inf
+    stood: int = 0
+    moved_s: float = -math.inf
+    jumped_s: float = math.inf
 
     def __post_init__(self) -> None:
         stated = self.stated
@@ -106,6 +112,19 @@ class _Channel:
         else:
             self.possible = PossibleMotion(stated.acceleration, stated.noise, stated.per_s)
         self.repeated = RepeatedValue(stated.sigma)
+
+    @property
+    def is_length(self) -> bool:
+        return not math.isnan(self.stated.acceleration)
+
+    def steps(self, time_s: float, value: float) -> bool:
+        """Whether it stood, has moved between two readings, and now has stood again for as long."""
+        if abs(value - self.value) > 2 * self.stated.noise:
+            self.jumped_s = self.last_s if self.stood >= _STANDS else math.inf
+            self.stood, self.moved_s = 0, time_s
+            return False
+        self.stood += 1
+        return self.stood == _STANDS and self.jumped_s < math.inf
 
     def restarted_s(self, now_s: float) -> float:
         """Time (s) from which its device could have restarted since the last reading; inf where it could not."""
@@ -174,6 +193,10 @@ class Blindness:
             self._contradict((channel,), time_s, f"{name} cannot have come to {value:.6g}")
         if not channel.repeated.follow(value):
             self._contradict((channel,), time_s, f"{name} repeats {value:.6g}")
+        if channel.is_length and channel.steps(time_s, value) and self._moved_alone(channel):
+            began_s = channel.jumped_s - late_s
+            stepped = [onset for onset in self._open if name in onset.channels and onset.began_s >= began_s]
+            self._show(stepped, time_s, f"{name} moved alone")
         usual_s = channel.usual_s
         if math.isnan(usual_s):
             channel.usual_s = passed_s
@@ -241,6 +264,11 @@ class Blindness:
         if gauge in self._channels:
             return [self._channels[gauge]]
         return [channel for name, channel in self._channels.items() if not gauge or name.startswith(f"{gauge}.")]
+
+    def _moved_alone(self, channel: _Channel) -> bool:
+        """Whether all other lengths stand since before its step. A machine can do that, but a bound can remember it."""
+        others = [other for other in self._channels.values() if other.is_length and other is not channel]
+        return bool(others) and all(other.moved_s < channel.jumped_s for other in others)
 
     def _contradict(self, channels: Sequence[_Channel], time_s: float, why: str) -> None:
         for channel in channels:

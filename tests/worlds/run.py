@@ -31,6 +31,8 @@ LOOKS_EVERY_S, ACTS_AFTER_S = 0.25, 3.0
 ACCEPTS_AFTER_S = 0.5
 # Until the files of a recording are closed, s.
 RECORDED_WITHIN_S = 1.0
+# Before the first event, so that what every gauge shows without a fault is known, s.
+LISTENS_FIRST_S = 0.3
 # Speed of the drives before the first event, mm/s.
 _MM_PER_S = 50.0
 # Work during which the daemon stops and starts anew.
@@ -73,6 +75,7 @@ def play(
         with built(path, plan.seed, drives, change, measured_errors) as world:
             blindness = Blindness.of(world.configuration)
             with listening(blindness):
+                world.run(LISTENS_FIRST_S)
                 return _Play(plan, world, blindness, hear).run(until, record_to)
 
 

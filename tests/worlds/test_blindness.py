@@ -171,6 +171,30 @@ def test_a_lost_line_shows_what_happened_while_it_was_lost() -> None:
     assert after.hides_at(2.9)
 
 
+@pytest.mark.parametrize(
+    ("step_mm", "other_mm", "ramp_s", "seen"),
+    [
+        (0.02, 0.0, 0.0, True),
+        (0.02, 0.02, 0.0, False),  # the machine may have been jogged
+        (0.02, 0.0, 0.3, False),  # a creep
+        (3e-4, 0.0, 0.0, False),  # within the noise
+    ],
+)
+def test_a_step_of_one_length_at_rest_shows_itself(step_mm: float, other_mm: float, ramp_s: float, seen: bool) -> None:
+    watch = Blindness({"a": LENGTH, "b": LENGTH})
+    onset = None
+    for k in range(200):
+        time_s = 0.01 * k
+        if k == 100:
+            onset = watch.begins(time_s - 0.005, "a")
+        share = 0.0 if k < 100 else min(1.0, (time_s - 1.0) / ramp_s) if ramp_s else 1.0
+        watch.read("a", time_s, share * step_mm, LATE_S)
+        watch.read("b", time_s + 0.001, share * other_mm, LATE_S)
+    assert onset is not None
+    assert (onset.seen_s < 1.05) is seen
+    assert watch.since_s() == math.inf
+
+
 def test_a_gauge_that_is_polled_seldom_has_no_gaps() -> None:
     watch = Blindness({GAUGE: THERMOMETER})
     for k in range(100):
@@ -323,7 +347,7 @@ def test_in_a_world_each_fault_is_visible_or_left_out() -> None:
         watched(world, watch)
         one, two, three = scales(world)
         small = watch.begins(world.hub.now_s, one)
-        shift(world, one, 5e-3)  # below A t^2
+        shift(world, one, lambda _, mm: mm + 0.02 * min(max(world.hub.now_s - small.began_s, 0.0), 0.25))  # a creep
         world.run(0.5)
         large = watch.begins(world.hub.now_s, two)
         shift(world, two, 0.5)

@@ -5,16 +5,20 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+from collections import Counter
 from pathlib import Path
 
 import pytest
 
 from tests.support.paths import ROOT
+from tests.worlds import command
 from tests.worlds.command import Order, fixed_orders, main
 from tests.worlds.compare import Row, compared
+from tests.worlds.coverage import Coverage
 from tests.worlds.known import known_worlds
 from tests.worlds.plan import Plan
-from tests.worlds.run import play
+from tests.worlds.run import Report, play
+from tests.worlds.watch import Finding
 
 KEPT = sorted(Path(__file__).with_name("kept").glob("*.json"))
 # Of a fixed seed; `make worlds` plays all of it.
@@ -44,11 +48,11 @@ def test_every_known_plan_is_kept() -> None:
 
 
 def test_a_seed_gives_the_same_bytes_in_two_processes() -> None:
-    command = [sys.executable, "-m", "tests.worlds", "--seed", "3", "--minutes", "0.05", "--shrink-for", "0"]
+    repeat = [sys.executable, "-m", "tests.worlds", "--seed", "3", "--minutes", "0.05", "--shrink-for", "0"]
     lines = []
     for hash_seed in ("1", "2"):
         done = subprocess.run(
-            command,
+            repeat,
             capture_output=True,
             text=True,
             cwd=ROOT,
@@ -74,3 +78,33 @@ def test_rows_are_compared_by_state_and_by_numbers() -> None:
     assert "differs by 1e-07 mm" in str(compared(row, row._replace(numbers_mm=(1.0, 2.0 + 1e-7, float("nan")))))
     assert "ok here, fault" in str(compared(row, row._replace(state="fault", numbers_mm=())))
     assert "ends earlier" in str(compared(row, None))
+
+
+@pytest.mark.parametrize(
+    ("options", "status"),
+    [
+        (["--seed", "5"], 1),
+        (["--fresh-for", "0.001"], 0),
+        (["--fresh-for", "0.001", "--fresh-fails"], 1),
+    ],
+)
+def test_a_failure_fails_the_run_unless_its_seed_is_fresh(
+    options: list[str],
+    status: int,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(tmp_path)
+
+    def fail(plan: Plan, **_: object) -> Report:
+        finding = Finding("within_bound", "none", 0.1, "far away")
+        return Report(plan, 1, "0", Coverage(), [finding], Counter(), 0)
+
+    monkeypatch.setattr(command, "play", fail)
+    monkeypatch.setattr(command, "shrink", lambda plan, what, real_s: plan)
+    assert main([*options, "--minutes", "0.01", "--machine", "linear-delta"]) == status
+    said = capsys.readouterr().out.splitlines()
+    assert said[0].startswith('make worlds OPTIONS="--seed ')
+    assert said[-1].startswith("1 seeds, 0.000 h, 1 setpoints, ")
+    assert said[-1].endswith("within_bound in 1 cases")
