@@ -120,6 +120,9 @@ class Watch:
                 self.note(name, sight.blame, text)
         if text := self._recovery.late(sight):
             self.note("valid_again", sight.blame, text)
+        valid_for_s = self.world.running.sockets.target.valid_for_s
+        if text := invariants.fresh_target(setpoint, self.world.controller.target_s, valid_for_s):
+            self.note("fresh_target", sight.blame, text)
         if text := self.promises.broken(setpoint):
             self.note("adopted_model", sight.blame, text)
         if told.state is not State.FAULT:
