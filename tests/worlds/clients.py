@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterator
-from contextlib import suppress
+from contextlib import closing, suppress
 from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from compd.configuration import Configuration
-from compd.errors import DaemonError
+from compd.errors import CompdError, DaemonError
 from compd.live.record import ReadingsFeed, Recorder, RecordingLimits
 from tests.worlds.connection import Connection
 from tests.worlds.virtual_system import VirtualSystem
@@ -110,16 +110,20 @@ class Recording:
 
     Attributes
     ----------
-    done : whether its files are closed. summary : what it says at its end. said : what it has said before.
+    name : of its parts. done : whether its files are closed. summary : what it says at its end. said : what it has said
+        before. failure : what ended it; "" where a person did.
+    received : the lines of all READINGS that came.
     """
 
     def __init__(self, system: VirtualSystem, path: Path, name: Path, configuration: Configuration) -> None:
         self.done = False
         self.summary = ""
+        self.failure = ""
         self.said: list[str] = []
+        self.received: list[bytes] = []
+        self.name = name
         self._system = system
         self._path = path
-        self._name = name
         self._configuration = configuration
         self._ends = False
 
@@ -131,19 +135,22 @@ class Recording:
         """As the command does."""
         feed = ReadingsFeed(self._connect, None, self.said.append, self._system)
         recorder = Recorder(
-            self._name, *feed.first_messages, _LIMITS, self.said.append, self._system, configuration=self._configuration
+            self.name, *feed.first_messages, _LIMITS, self.said.append, self._system, configuration=self._configuration
         )
         recorder.start()
         try:
-            with suppress(_EndedByPerson):
-                recorder.follow(feed.messages())
+            with suppress(_EndedByPerson), closing(feed.messages()) as messages:
+                recorder.follow(messages)
+        except CompdError as failure:
+            self.failure = str(failure)
         finally:
-            recorder.close()
+            with suppress(CompdError):  # it has been said
+                recorder.close()
             self.summary, self.done = recorder.summary(), True
 
     def _connect(self) -> _Readings:
         try:
-            return _Readings(Connection(self._system, self._path), lambda: self._ends, self._system)
+            return _Readings(Connection(self._system, self._path), lambda: self._ends, self._system, self.received)
         except OSError as error:
             raise DaemonError.of("the daemon", str(error)) from error
 
@@ -151,7 +158,10 @@ class Recording:
 class _Readings:
     """What `ReadingsFeed` needs of a client."""
 
-    def __init__(self, connection: Connection, ends: Callable[[], bool], system: VirtualSystem) -> None:
+    def __init__(
+        self, connection: Connection, ends: Callable[[], bool], system: VirtualSystem, received: list[bytes]
+    ) -> None:
+        self._received = received
         self._connection = connection
         self._ends = ends
         self._system = system
@@ -164,7 +174,10 @@ class _Readings:
         try:
             while not self._ends():
                 if line := self._connection.line(self._system.monotonic() + AGAIN_S):
-                    yield line, json.loads(line)
+                    message = json.loads(line)
+                    if message["class"] == "READINGS":
+                        self._received.append(line)
+                    yield line, message
         except OSError as error:
             raise DaemonError.of("the daemon", str(error)) from error
         raise _EndedByPerson
