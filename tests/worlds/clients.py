@@ -19,6 +19,8 @@ from tests.worlds.virtual_system import VirtualSystem
 PATIENCE_S = 30.0
 # Until a client that has lost its daemon tries again, s.
 AGAIN_S = 0.2
+# Between two bursts of a program that asks without end, s.
+_FLOODS_EVERY_S = 0.02
 # Of a recording: no part is closed for its size or age.
 _LIMITS = RecordingLimits(10**9, 1e9, 10**10, drop_oldest=False)
 
@@ -38,12 +40,14 @@ class Clients:
     ----------
     answers : to the persons' requests, in the order in which they came.
     asks : called with the number of each request, the request and its file. replies : called with number and answer.
+    heard_s : when the program that watches got its last setpoint, s.
     """
 
     def __init__(self, system: VirtualSystem, path: Path) -> None:
         self.answers: list[Answer] = []
         self.asks: list[Callable[[int, dict[str, Any], Path | None], object]] = []
         self.replies: list[Callable[[int, dict[str, Any] | None], object]] = []
+        self.heard_s = system.monotonic()
         self._system = system
         self._path = path
         self._numbers = self._requests = 0
@@ -84,11 +88,46 @@ class Clients:
             while True:
                 with suppress(OSError), Connection(self._system, self._path) as connection:
                     connection.send({"class": "WATCH", "rate_hz": rate_hz})
-                    for _ in connection.messages():
-                        pass
+                    for message in connection.messages():
+                        if message["class"] == "SETPOINT":
+                            self.heard_s = self._system.monotonic()
                 self._system.sleep_until(self._system.monotonic() + AGAIN_S)
 
         self._start(follow)
+
+    def does_not_read(self, lasts_s: float) -> None:
+        """A program that watches all readings and reads none of them."""
+
+        def hang() -> None:
+            with suppress(OSError), Connection(self._system, self._path) as connection:
+                connection.send({"class": "WATCH", "what": "readings"})
+                self._system.sleep_until(self._system.monotonic() + lasts_s)
+
+        self._start(hang)
+
+    def floods(self, per_s: float, lasts_s: float) -> None:
+        """A program that asks without end, and reads the answers now and then."""
+        end_s = self._system.monotonic() + lasts_s
+
+        def ask() -> None:
+            while self._system.monotonic() < end_s:
+                with suppress(OSError), Connection(self._system, self._path) as connection:
+                    while self._system.monotonic() < end_s:
+                        connection.send_bytes(b'{"class":"STATUS"}\n' * max(1, round(per_s * _FLOODS_EVERY_S)))
+                        connection.line(self._system.monotonic() + _FLOODS_EVERY_S)
+                self._system.sleep_until(self._system.monotonic() + AGAIN_S)
+
+        self._start(ask)
+
+    def goes_within_a_line(self, line: bytes) -> None:
+        """A program that ends within a line."""
+
+        def go() -> None:
+            with suppress(OSError), Connection(self._system, self._path) as connection:
+                connection.send_bytes(line[: len(line) // 2])
+                self._system.sleep_until(self._system.monotonic() + AGAIN_S)
+
+        self._start(go)
 
     def record(self, name: Path, configuration: Configuration) -> Recording:
         """A program that records the readings of every cycle."""

@@ -3,19 +3,21 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from compd.configuration import load
 from compd.live.record.recording_part import RecordingPart
 from tests.support.paths import CONFIG
+from tests.worlds.clients import Recording
 from tests.worlds.faults import begin
 from tests.worlds.faults.computer import killed
 from tests.worlds.recorded import recorded
 from tests.worlds.world import LOOP, SERVICE, World, built
 
 
-def record(world: World, name: Path):
+def record(world: World, name: Path) -> Recording:
     machine = name.with_name("machine.yaml")
     machine.write_text(world.configuration.path.read_text())
     return world.clients.record(name, load(machine))
@@ -52,9 +54,10 @@ def test_a_full_disk_ends_a_recording_with_a_sentence(tmp_path: Path) -> None:
 
 
 def test_a_row_that_is_not_written_is_seen(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    add, calls = RecordingPart.add, []
+    add = RecordingPart.add
+    calls: list[bytes] = []
 
-    def forgetful(part, line, message):
+    def forgetful(part: RecordingPart, line: bytes, message: dict[str, Any]) -> None:
         calls.append(line)
         if len(calls) != 7:
             add(part, line, message)

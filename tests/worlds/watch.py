@@ -18,6 +18,10 @@ from tests.worlds.recovery import Recovery
 from tests.worlds.sight import Happening, Sight
 from tests.worlds.world import Told, World
 
+# Work during which the daemon serves its clients without a pause.
+QUIET = ("driven", "jogged", "rests", "accept")
+# A daemon that starts anew serves its clients after so long, s.
+SERVES_AFTER_S = 1.0
 # Between two comparisons of the gauges with each other, s.
 LOOK_EVERY_S = 0.1
 
@@ -65,6 +69,7 @@ class Watch:
         self.promises = Promises(self.world)
         self._faulty_since_s: float | None = None
         self._without_zero_since_s: float | None = None
+        self._setpoint_s = self._disturbed_s = self._began_s
         self.world.hearers.append(self.hear)
         self.world.hub.every(LOOK_EVERY_S, lambda: self.blindness.look(self.world.hub.now_s))
 
@@ -120,6 +125,8 @@ class Watch:
                 self.note(name, sight.blame, text)
         if text := self._recovery.late(sight):
             self.note("valid_again", sight.blame, text)
+        if text := invariants.nobody_waits(self._heard_s(now_s), now_s):
+            self.note("nobody_waits", sight.blame, text)
         valid_for_s = self.world.running.sockets.target.valid_for_s
         if text := invariants.fresh_target(setpoint, self.world.controller.target_s, valid_for_s):
             self.note("fresh_target", sight.blame, text)
@@ -137,6 +144,14 @@ class Watch:
             self._before = setpoint
         if self.hear_also is not None:
             self.hear_also(sight)
+
+    def _heard_s(self, now_s: float) -> float:
+        """When the client that watches has got a setpoint, s; it is owed none soon after the daemon was disturbed."""
+        families = {one.event.family for one in self._recent if one.event.kind not in QUIET}
+        if families - {"clients"} or now_s - self._setpoint_s > invariants.HEARS_WITHIN_S:
+            self._disturbed_s = now_s
+        self._setpoint_s = now_s
+        return max(self.world.clients.heard_s, self._disturbed_s + SERVES_AFTER_S)
 
     def _hides_at(self, time_s: float) -> bool:
         """Whether a fault that no reading shows yet has an effect at this time, s."""
