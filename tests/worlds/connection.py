@@ -56,6 +56,10 @@ class Connection:
         finally:
             os.close(descriptor)
 
+    def send_bytes(self, data: bytes) -> None:
+        """Send what need not be a line."""
+        self._socket.sendall(data)
+
     def line(self, until_s: float = math.inf) -> bytes:
         """The next line; b"" where none has come until `until_s`, monotonic s."""
         while not self._lines:

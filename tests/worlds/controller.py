@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Callable
 from contextlib import suppress
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -25,8 +27,9 @@ class Controller:
 
     Attributes
     ----------
-    on : whether it is the machine's controller. tip_mm : (3) where the tip is to be, in {M}, or in {P} of a machine
-        whose tool is on the plate; nan before the first target.
+    turn : number of its turns as the machine's controller; 0 while it is none. tip_mm : (3) where the tip is to be, in
+        {M}, or in {P} of a machine whose tool is on the plate; nan before the first target.
+    target_s : time of the newest target that was sent, s; -inf before the first.
     """
 
     def __init__(
@@ -34,7 +37,8 @@ class Controller:
     ) -> None:
         """`drive`: begins to drive the links to their setpoints, (n) mm."""
         base = configuration.geometry.base
-        self.on = False
+        self.turn = self._turns = 0
+        self.target_s = -math.inf
         self.tip_mm = np.full(3, np.nan)
         self._origin_mm = np.array(base.origin_B0_in_M_mm)
         self._rotation = Rotation.from_rotvec(base.rotation_B0_in_M_rad)
@@ -48,12 +52,18 @@ class Controller:
         self._exchanged = (0, 0)
         self._last: dict[str, Any] = {}
 
-    def begin(self, tip_mm: np.ndarray) -> None:
-        """Take the machine over, with the tip where it is."""
+    @property
+    def on(self) -> bool:
+        """Whether it is the machine's controller."""
+        return self.turn > 0
+
+    def begin(self, tip_mm: np.ndarray) -> int:
+        """Take the machine over, with the tip where it is. Returns the number of this turn."""
         self.tip_mm = self._goal_mm = np.array(tip_mm)
-        if not self.on:
-            self.on = True
-            self._system.start(self._run, "client controller")
+        self._turns += 1
+        self.turn, self._last = self._turns, {}
+        self._system.start(partial(self._run, self.turn), "client controller")
+        return self.turn
 
     def go(self, tip_mm: np.ndarray, mm_per_s: float) -> None:
         """Go to another place."""
@@ -61,12 +71,12 @@ class Controller:
 
     def end(self) -> None:
         """Leave the machine to itself: the mode is CMM again."""
-        self.on = False
+        self.turn = 0
 
     # --- faults ----------------------------------------------------------------------------------------
 
     def silent(self, duration_s: float) -> None:
-        """Send no target for so long."""
+        """Send no target for so long, after the first."""
         self._silent_until_s = self._system.monotonic() + duration_s
 
     def old(self, duration_s: float) -> None:
@@ -79,24 +89,26 @@ class Controller:
 
     # --- as an actor -----------------------------------------------------------------------------------
 
-    def _run(self) -> None:
-        while self.on:
+    def _run(self, turn: int) -> None:
+        while self.turn == turn:
             with suppress(OSError):
-                self._control()
+                self._control(turn)
             self._system.sleep_until(self._system.monotonic() + AGAIN_S)
 
-    def _control(self) -> None:
+    def _control(self, turn: int) -> None:
         system, period_s = self._system, 1.0 / RATE_HZ
         with Connection(system, self._path) as connection:
             connection.send({"class": "WATCH", "rate_hz": RATE_HZ})
             due_s = system.monotonic()
-            while self.on:
+            while self.turn == turn:
                 if system.monotonic() >= due_s:
                     due_s += period_s
                     self._advance(period_s)
-                    if system.monotonic() >= self._silent_until_s:
-                        connection.send(self._target())
-                if line := connection.line(due_s):
+                    if system.monotonic() >= self._silent_until_s or not self._last:
+                        target = self._target()
+                        connection.send(target)
+                        self.target_s = target["time_s"]
+                if (line := connection.line(due_s)) and self.turn == turn:
                     self._take(json.loads(line))
 
     def _advance(self, time_s: float) -> None:
@@ -114,6 +126,8 @@ class Controller:
         return self._last
 
     def _take(self, message: dict[str, Any]) -> None:
+        if message.get("code") == "role_taken":  # a person has done so
+            self.end()
         if message["class"] != "SETPOINT" or not message["valid"] or message["mode"] != "machine_tool":
             return
         scale_mm = np.array(message["scale_setpoint_mm"])

@@ -1,8 +1,8 @@
 """What must hold in every world: each a function that says what does not hold, and "" where it holds.
 
 Of each setpoint: `within_bound`, `steady_correction`, `true_reason`. Of a world between two of its events:
-`nothing_lost`; of its models: `adopted_model`; of a whole world: `mostly_valid`. `tests.worlds.recovery` has the times
-after faults, and `tests.worlds.run` sees tracebacks.
+`nothing_lost`; of its models: `adopted_model`; of its controller: `fresh_target`; of its clients: `nobody_waits`; of a
+whole world: `mostly_valid`. `tests.worlds.recovery` has the times after faults, and `tests.worlds.run` sees tracebacks.
 """
 
 from __future__ import annotations
@@ -12,7 +12,8 @@ from collections.abc import Callable, Mapping, Set
 import numpy as np
 
 from compd.configuration import Configuration
-from compd.setpoint_states import State
+from compd.live.loop import Setpoint
+from compd.setpoint_states import Mode, State
 from tests.worlds.coverage import Coverage
 from tests.worlds.sight import Sight
 
@@ -20,6 +21,8 @@ from tests.worlds.sight import Sight
 MOST = 3.0
 # Share of valid setpoints in a world without faults.
 VALID_SHARE = 0.99
+# Longest time between two setpoints at a client that wants 20 a second, s.
+HEARS_WITHIN_S = 0.15
 # Rounding of a correction and of a time, mm and s.
 _ROUNDING_MM, _ROUNDING_S = 1e-9, 1e-6
 
@@ -89,6 +92,27 @@ def adopted_model(allowed: Set[str], used: str) -> str:
     if used in allowed:
         return ""
     return f"runs with the model {used or 'none'}; promised was {' or '.join(sorted(one or 'none' for one in allowed))}"
+
+
+def fresh_target(setpoint: Setpoint, target_s: float, valid_for_s: float) -> str:
+    """No valid setpoint in machine-tool mode is for a target that is too old (docs/reference/protocol.md).
+
+    target_s : time of the newest target that the controller has sent, s. valid_for_s : `sockets.target.valid_for_s`.
+    """
+    age_s = setpoint.time_s - target_s
+    if not setpoint.valid or setpoint.mode is not Mode.MACHINE_TOOL or age_s <= valid_for_s + _ROUNDING_S:
+        return ""
+    return f"valid for a target of {age_s:.3f} s ago; allowed {valid_for_s:g} s"
+
+
+def nobody_waits(heard_s: float, now_s: float) -> str:
+    """A client that is slow, asks without end or goes keeps no setpoint from the others.
+
+    heard_s : when the client that watches has got its last setpoint, s.
+    """
+    if now_s - heard_s <= HEARS_WITHIN_S:
+        return ""
+    return f"a client that watches has got no setpoint for {now_s - heard_s:.3f} s; allowed {HEARS_WITHIN_S:g} s"
 
 
 def mostly_valid(coverage: Coverage, without_faults: bool) -> str:

@@ -21,6 +21,7 @@ from tests.worlds.invariants import mostly_valid
 from tests.worlds.machines import fast, machine_file, measured_errors
 from tests.worlds.plan import Event, Plan
 from tests.worlds.rates import kinds
+from tests.worlds.recorded import recorded
 from tests.worlds.sight import Happening, Sight
 from tests.worlds.watch import Finding, Watch
 from tests.worlds.world import World, built
@@ -109,6 +110,8 @@ class _Play:
         if recording is not None:
             recording.end()
             world.run(RECORDED_WITHIN_S)
+            if text := recorded(recording, world.configuration):
+                watch.note("recorded", self._blame(), text)
         without_faults = all(event.name in _WORK - _STOPS for event in plan.events)
         if text := mostly_valid(watch.coverage, without_faults):
             watch.note("mostly_valid", NO_FAULT, text)

@@ -43,7 +43,8 @@ def test_events_come_as_often_as_their_rates_say() -> None:
 
 def test_without_faults_there_is_work_alone() -> None:
     plan = draw(1, 3600.0, kinds(NONE), "tripod-cmm.yaml")
-    assert {event.name for event in plan.events} == {"machine.driven", "machine.jogged", "machine.rests"}
+    names = {event.name for event in plan.events}
+    assert names == {"machine.driven", "machine.jogged", "machine.rests", "machine.controlled"}
 
 
 def test_parameters_lie_in_their_ranges() -> None:

@@ -18,8 +18,15 @@ from tests.worlds.sight import Happening, Sight
 from tests.worlds.unknowable import Judge
 from tests.worlds.world import Told, World
 
+<<<<<<< HEAD
 # From a person's `accept` until every process of the daemon has taken it in, s.
 ACCEPTED_WITHIN_S = 0.5
+=======
+# Work during which the daemon serves its clients without a pause.
+QUIET = ("driven", "jogged", "rests", "accept")
+# A daemon that starts anew serves its clients after so long, s.
+SERVES_AFTER_S = 1.0
+>>>>>>> acts
 # Between two comparisons of the gauges with each other, s.
 LOOK_EVERY_S = 0.1
 
@@ -68,6 +75,7 @@ class Watch:
         self.promises = Promises(self.world)
         self._faulty_since_s: float | None = None
         self._without_zero_since_s: float | None = None
+        self._setpoint_s = self._disturbed_s = self._began_s
         self.world.hearers.append(self.hear)
         self.world.hub.every(LOOK_EVERY_S, lambda: self.blindness.look(self.world.hub.now_s))
 
@@ -126,6 +134,11 @@ class Watch:
                 self.note(name, sight.blame, text)
         if text := self._recovery.late(sight):
             self.note("valid_again", sight.blame, text)
+        if text := invariants.nobody_waits(self._heard_s(now_s), now_s):
+            self.note("nobody_waits", sight.blame, text)
+        valid_for_s = self.world.running.sockets.target.valid_for_s
+        if text := invariants.fresh_target(setpoint, self.world.controller.target_s, valid_for_s):
+            self.note("fresh_target", sight.blame, text)
         if text := self.promises.broken(setpoint):
             self.note("adopted_model", sight.blame, text)
         if told.state is not State.FAULT:
@@ -141,6 +154,7 @@ class Watch:
         if self.hear_also is not None:
             self.hear_also(sight)
 
+<<<<<<< HEAD
     def _suspects_at(self, now_s: float) -> frozenset[str]:
         """Gauges that had a fault since a person has looked, as far as the daemon can know of that."""
         accepted_s, before = self._accepted
@@ -148,6 +162,18 @@ class Watch:
 
     def _hidden(self, time_s: float) -> set[str]:
         """Channels of faults that no reading shows yet, and that have an effect at this time, s."""
+=======
+    def _heard_s(self, now_s: float) -> float:
+        """When the client that watches has got a setpoint, s; it is owed none soon after the daemon was disturbed."""
+        families = {one.event.family for one in self._recent if one.event.kind not in QUIET}
+        if families - {"clients"} or now_s - self._setpoint_s > invariants.HEARS_WITHIN_S:
+            self._disturbed_s = now_s
+        self._setpoint_s = now_s
+        return max(self.world.clients.heard_s, self._disturbed_s + SERVES_AFTER_S)
+
+    def _hides_at(self, time_s: float) -> bool:
+        """Whether a fault that no reading shows yet has an effect at this time, s."""
+>>>>>>> acts
         for happening, onset in self._onsets:
             if not happening.fault.present and onset.ended_s == math.inf:
                 self.blindness.ends(onset, happening.fault.ended_s)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator, Iterator
 from dataclasses import dataclass
 from typing import Any, NamedTuple, Protocol
 
@@ -76,7 +76,7 @@ class ReadingsFeed:
     def first_messages(self) -> tuple[Message, Message]:
         return self._connection.first_messages
 
-    def messages(self, for_s: float | None = None) -> Iterator[FeedItem]:
+    def messages(self, for_s: float | None = None) -> Generator[FeedItem, None, None]:
         """Iterate over the messages for `for_s` seconds of the daemon's time; None is for ever.
 
         When the daemon goes away, that is reported, and the iterator waits until one answers at the same place.
