@@ -18,15 +18,12 @@ from tests.worlds.sight import Happening, Sight
 from tests.worlds.unknowable import Judge
 from tests.worlds.world import Told, World
 
-<<<<<<< HEAD
 # From a person's `accept` until every process of the daemon has taken it in, s.
 ACCEPTED_WITHIN_S = 0.5
-=======
 # Work during which the daemon serves its clients without a pause.
 QUIET = ("driven", "jogged", "rests", "accept")
 # A daemon that starts anew serves its clients after so long, s.
 SERVES_AFTER_S = 1.0
->>>>>>> acts
 # Between two comparisons of the gauges with each other, s.
 LOOK_EVERY_S = 0.1
 
@@ -154,15 +151,6 @@ class Watch:
         if self.hear_also is not None:
             self.hear_also(sight)
 
-<<<<<<< HEAD
-    def _suspects_at(self, now_s: float) -> frozenset[str]:
-        """Gauges that had a fault since a person has looked, as far as the daemon can know of that."""
-        accepted_s, before = self._accepted
-        return frozenset(self._suspects | before if now_s < accepted_s + ACCEPTED_WITHIN_S else self._suspects)
-
-    def _hidden(self, time_s: float) -> set[str]:
-        """Channels of faults that no reading shows yet, and that have an effect at this time, s."""
-=======
     def _heard_s(self, now_s: float) -> float:
         """When the client that watches has got a setpoint, s; it is owed none soon after the daemon was disturbed."""
         families = {one.event.family for one in self._recent if one.event.kind not in QUIET}
@@ -171,9 +159,13 @@ class Watch:
         self._setpoint_s = now_s
         return max(self.world.clients.heard_s, self._disturbed_s + SERVES_AFTER_S)
 
-    def _hides_at(self, time_s: float) -> bool:
-        """Whether a fault that no reading shows yet has an effect at this time, s."""
->>>>>>> acts
+    def _suspects_at(self, now_s: float) -> frozenset[str]:
+        """Gauges that had a fault since a person has looked, as far as the daemon can know of that."""
+        accepted_s, before = self._accepted
+        return frozenset(self._suspects | before if now_s < accepted_s + ACCEPTED_WITHIN_S else self._suspects)
+
+    def _hidden(self, time_s: float) -> set[str]:
+        """Channels of faults that no reading shows yet, and that have an effect at this time, s."""
         for happening, onset in self._onsets:
             if not happening.fault.present and onset.ended_s == math.inf:
                 self.blindness.ends(onset, happening.fault.ended_s)

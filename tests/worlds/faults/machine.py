@@ -18,14 +18,11 @@ from tests.worlds.world import World
 
 # From the loss of the scales to the push, s.
 _PUSHED_AFTER_S = 0.1
-<<<<<<< HEAD
 _FASTEST_MM_PER_S = 1e3
 # How often somebody looks whether the machine stands, and how long it then rests, s.
 _LOOKS_EVERY_S, _RESTS_S = 0.05, 0.3
-=======
 # A controller that goes to and fro turns after so long, s; its links are faster than its tip by up to this factor.
 _TURNS_AFTER_S, _LINKS_PER_TIP = 2.0, 3.0
->>>>>>> acts
 
 
 def driven(world: World, target: str, to_mm: Sequence[float], mm_per_s: float, mm_per_s2: float | None = None) -> Fault:
@@ -97,7 +94,6 @@ def collides(world: World, target: str) -> Fault:
     return Fault(world, lasts_s=0.0)
 
 
-<<<<<<< HEAD
 def _when_it_stands(world: World, then: Callable[[], object]) -> None:
     """Call a function when the machine has stood for a moment."""
     hub = world.hub
@@ -121,9 +117,6 @@ def _fast(world: World) -> Drives:
     return _drives(world, _FASTEST_MM_PER_S, None)
 
 
-def _drive(world: World, to_mm: np.ndarray, drives: Drives) -> None:
-    """Drive within the limits `drives`; a place beyond the stroke is refused, as a controller does."""
-=======
 def controlled(world: World, target: str, to_mm: Sequence[float], mm_per_s: float, lasts_s: float) -> Fault:
     """A controller takes the machine for `lasts_s` (s): it goes there and back again and again.
 
@@ -134,7 +127,7 @@ def controlled(world: World, target: str, to_mm: Sequence[float], mm_per_s: floa
         ends = [world.truth.tip_for(to_mm), world.truth.tip_for(world.scale_mm().tolist())]
     except CompdError:
         return Fault(world, lasts_s=0.0)
-    _set_speed(world, _LINKS_PER_TIP * mm_per_s)
+    _set_drives(world, _drives(world, _LINKS_PER_TIP * mm_per_s, None))
     turn = controller.begin(ends[1])
 
     def go() -> None:
@@ -152,30 +145,21 @@ def controlled(world: World, target: str, to_mm: Sequence[float], mm_per_s: floa
     return fault
 
 
-def _drive(world: World, to_mm: np.ndarray, mm_per_s: float) -> None:
-    """Drive at up to `mm_per_s`; a place beyond the stroke is refused, as a controller does."""
+def _drive(world: World, to_mm: np.ndarray, drives: Drives) -> None:
+    """Drive within the limits `drives`; a place beyond the stroke is refused, as a controller does."""
     world.controller.end()
-    _set_speed(world, mm_per_s)
-    try:
+    _set_drives(world, drives)
+    with suppress(CompdError):
         world.drive(to_mm.tolist())
-    except CompdError:
-        return
 
 
-def _set_speed(world: World, mm_per_s: float) -> None:
->>>>>>> acts
+def _set_drives(world: World, drives: Drives) -> None:
+    """Limits of the links from now on."""
     truth = world.truth
     truth._drives = drives
     if isinstance(truth._motion, SetpointMotion):
-<<<<<<< HEAD
         if world.moving:  # links that move are not faster than their drives, and stop within their stroke
             before = truth._motion._drives
             fastest_mm_per_s = float(np.abs(truth._motion.speeds_mm_per_s).max())
             drives = Drives(max(drives.mm_per_s, fastest_mm_per_s), max(drives.mm_per_s2, before.mm_per_s2))
         truth._motion._drives = drives
-    with suppress(CompdError):
-        world.drive(to_mm.tolist())
-=======
-        # the speed that a link has is at most that of its drives
-        truth._motion._drives = Drives(max(mm_per_s, *np.abs(truth._motion.speeds_mm_per_s)), truth._drives.mm_per_s2)
->>>>>>> acts
