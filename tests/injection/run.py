@@ -11,7 +11,6 @@ import multiprocessing
 import os
 import traceback
 from collections.abc import Sequence
-from concurrent.futures import ProcessPoolExecutor
 from fnmatch import fnmatch
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -89,10 +88,11 @@ def _try(names: Sequence[str], jobs: int) -> list[Tried]:
     context = multiprocessing.get_context("spawn")
     tried = []
     with (
-        ProcessPoolExecutor(jobs, context, max_tasks_per_child=TASKS_PER_PROCESS) as pool,
+        # a ProcessPoolExecutor may wait for ever for a process that it replaces (python/cpython#115634)
+        context.Pool(jobs, maxtasksperchild=TASKS_PER_PROCESS) as pool,
         count_shown(len(names), "trials") as shown,
     ):
-        for number, one in enumerate(pool.map(try_named, names), start=1):
+        for number, one in enumerate(pool.imap(try_named, names), start=1):
             tried.append(one)
             shown(number)
     return tried
