@@ -117,9 +117,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
         fails += _tell(played, options)
     _bar(1.0)
     print(total.table())
-    skipped = sum((played.report.skipped for played in total.worlds), Counter())
-    if skipped:
-        print("not played, because this World has no such part: " + ", ".join(f"{k} {n}" for k, n in skipped.items()))
     print(total.line())
     return 1 if fails and not (options.fresh_for and not options.fresh_fails) else 0
 

@@ -12,6 +12,7 @@ from typing import NamedTuple
 from compd.configuration import Configuration
 from compd.setpoint_states import State
 from docs.generate.state_ends import PERSON, Cause, cause_of_silence, within_s
+from tests.worlds.invariants import named_in
 from tests.worlds.sight import Happening, Sight
 
 # What the states come from after a fault of a kind; `Cause.WRONG` after all others.
@@ -74,6 +75,12 @@ def _causes(configuration: Configuration, one: Happening, gauges: Sequence[str],
     return causes
 
 
+def asks_for_a_suspect(sight: Sight) -> bool:
+    """Whether a person is asked to look at a gauge that had a fault before, which was not seen until now."""
+    named = named_in(sight.told.reason, sight.configuration)
+    return sight.told.state is State.FAULT and ("" in sight.suspects or bool(named & sight.suspects))
+
+
 class Recovery:
     """Follows one world from its last fault to its next valid setpoint."""
 
@@ -82,6 +89,7 @@ class Recovery:
         self._awaited: list[Happening] = []
         self._accepted_s: float | None = None
         self._moved = False
+        self._known: tuple[tuple[int, bool], Allowed] | None = None
 
     def begins(self, happening: Happening) -> None:
         """A fault begins."""
@@ -89,6 +97,7 @@ class Recovery:
             self._moved = self._moved and bool(self._awaited)
             self._awaited.append(happening)
             self._accepted_s = None
+            self._known = None
 
     def accepted(self, now_s: float) -> None:
         """A person has looked. A second look after the end of the same faults gives no further time."""
@@ -103,9 +112,9 @@ class Recovery:
         if sight.told.valid:
             self._awaited.clear()
             return ""
-        within_s, person = self._allowed(sight.configuration, self._awaited, self._moved)
+        within_s, person = self._allowed_now(sight.configuration)
         ended_s = max(happening.fault.ended_s for happening in self._awaited)
-        if person:
+        if person or asks_for_a_suspect(sight):
             if sight.told.state is State.NO_ZERO or (self._accepted_s is None and sight.told.state is State.FAULT):
                 return ""  # the person is on the way
             ended_s = max(ended_s, self._accepted_s or 0.0)
@@ -114,3 +123,10 @@ class Recovery:
         kinds = ", ".join(sorted({happening.event.name for happening in self._awaited}))
         self._awaited.clear()
         return f"not valid within {within_s:.3g} s after {kinds}: {sight.told.state}, {sight.told.reason[:200]}"
+
+    def _allowed_now(self, configuration: Configuration) -> Allowed:
+        """Of what is awaited, which has ended: it is asked with every setpoint, and changes with the motion alone."""
+        key = len(self._awaited), self._moved
+        if self._known is None or self._known[0] != key:
+            self._known = key, self._allowed(configuration, self._awaited, self._moved)
+        return self._known[1]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import tempfile
-from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
@@ -43,14 +42,13 @@ _WORK = {f"{kind.family}.{kind.name}" for kind in kinds() if not kind.fault}
 
 @dataclass
 class Report:
-    """What a world showed. skipped : events that the world cannot play, by kind. asked : how often a person came."""
+    """What a world showed. asked : how often a person came."""
 
     plan: Plan
     setpoints: int
     sha256: str
     coverage: Coverage
     findings: list[Finding]
-    skipped: Counter[str]
     asked: int
 
     @property
@@ -93,7 +91,6 @@ class _Play:
     def __init__(self, plan: Plan, world: World, blindness: Blindness, hear: Callable[[Sight], object] | None) -> None:
         self._plan, self._world = plan, world
         self._watch = Watch(world, blindness, hear_also=hear)
-        self._skipped: Counter[str] = Counter()
         self._asked = 0
         self._began_s = world.hub.now_s
         self._taking: Fault | None = None
@@ -121,7 +118,6 @@ class _Play:
             watch.digest.hexdigest(),
             watch.coverage,
             list(watch.found.values()),
-            self._skipped,
             self._asked,
         )
 
@@ -146,13 +142,7 @@ class _Play:
                 self._taking = zero(world, "")
 
     def _begin(self, event: Event) -> None:
-        try:
-            fault = begin(self._world, event.family, event.kind, event.target, event.parameters)
-        except AttributeError as missing:
-            if missing.obj is not self._world:
-                raise
-            self._skipped[event.name] += 1
-            return
+        fault = begin(self._world, event.family, event.kind, event.target, event.parameters)
         self._watch.begins(Happening(event, fault, event.name not in _WORK))
 
     def _blame(self) -> str:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
-from collections import Counter
 from pathlib import Path
 
 import pytest
@@ -99,7 +98,7 @@ def test_a_failure_fails_the_run_unless_its_seed_is_fresh(
 
     def fail(plan: Plan, **_: object) -> Report:
         finding = Finding("within_bound", "none", 0.1, "far away")
-        return Report(plan, 1, "0", Coverage(), [finding], Counter(), 0)
+        return Report(plan, 1, "0", Coverage(), [finding], 0)
 
     monkeypatch.setattr(command, "play", fail)
     monkeypatch.setattr(command, "shrink", lambda plan, what, real_s: plan)
